@@ -32,9 +32,12 @@ if TYPE_CHECKING:
         section_trial as section_trial,
     )
     from explore3d.bench.trace import (
+        PEER_SECONDS as PEER_SECONDS,
+        TRACED_MESH_SIZES as TRACED_MESH_SIZES,
         bench_trace as bench_trace,
         bump_mesh as bump_mesh,
         by_opencamlib as by_opencamlib,
+        trace_methods as trace_methods,
         trace_table as trace_table,
     )
     from explore3d.bench.wrong_models import (
@@ -63,7 +66,15 @@ _PUBLIC = {
     "figures": ("write_figures",),
     "scaling": ("AXES", "bench_scaling", "scaling_lines"),
     "sections": ("bench_sections", "section_lines", "section_trial"),
-    "trace": ("bench_trace", "bump_mesh", "by_opencamlib", "trace_table"),
+    "trace": (
+        "PEER_SECONDS",
+        "TRACED_MESH_SIZES",
+        "bench_trace",
+        "bump_mesh",
+        "by_opencamlib",
+        "trace_methods",
+        "trace_table",
+    ),
     "wrong_models": ("bench_wrong_models", "wrong_model_lines", "wrong_model_records", "wrong_model_run"),
 }
 doorway(__name__, _PUBLIC)

@@ -67,17 +67,27 @@ def all_stages(
 
 @bench.command()
 def trace(
-    triangles: Annotated[str, typer.Option(help="Sizes of the mesh, separated by commas.")] = "20000,200000,2000000",
-    side: Annotated[int, typer.Option(min=2, help="Queries along each side of the grid.")] = 256,
-    peers: Annotated[bool, typer.Option(help="Time OpenCAMLib as well, if it is installed.")] = False,
+    triangles: Annotated[
+        str | None, typer.Option(help="Sizes of the mesh, separated by commas; 20000,200000,2000000 if left out.")
+    ] = None,
+    side: Annotated[
+        int | None, typer.Option(min=2, help="Queries along each side of the grid; 256 if left out.")
+    ] = None,
+    peers: Annotated[bool, typer.Option(help="Time OpenCAMLib, coal and Open3D's rays as well, if installed.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="20,000 triangles, 128 queries to a side, peers 1 s.")] = False,
 ) -> None:
-    """Ball centres per second over the paper's bump, on one core, preparation included.
+    """Ball centres per second over the paper's bump, on one core: two meshes of each size, three balls, two layouts.
 
     Example: explore3d bench trace --triangles 20000,200000 --peers
     """
-    from explore3d.bench import bench_trace, trace_table
+    from explore3d.bench import PEER_SECONDS, TRACED_MESH_SIZES, bench_trace, trace_methods, trace_table
 
-    _print(trace_table(bench_trace([int(n) for n in _numbers(triangles)], side=side, peers=peers)))
+    sizes = [int(n) for n in _numbers(triangles)] if triangles else TRACED_MESH_SIZES[: 1 if quick else None]
+    methods, missing = trace_methods(peers)
+    _print(missing)
+    seconds = 1.0 if quick else PEER_SECONDS
+    timings = bench_trace(sizes, side=side or (128 if quick else 256), methods=methods, peer_seconds=seconds)
+    _print(trace_table(timings))
 
 
 @bench.command()
@@ -598,11 +608,13 @@ def circle(
 @bench.command()
 def scaling(
     store: Store,
-    axes: Annotated[str | None, typer.Option(help="samples, triangles, features, separated by commas; all.")] = None,
+    axes: Annotated[
+        str | None, typer.Option(help="samples, triangles, features, surface, separated by commas; all.")
+    ] = None,
     huge: Annotated[bool, typer.Option("--huge", help="Up to 1e8 samples: 2 GB of disk, many minutes.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="The three smallest sizes of each.")] = False,
 ) -> None:
-    """Time and memory against the number of samples, triangles and features, and the exponents that fit.
+    """Time and memory against samples, triangles, features and swept samples, and the exponents that fit.
 
     Example: explore3d bench scaling --store scaling.jsonl --axes samples --quick
     """

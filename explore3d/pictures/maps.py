@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from explore3d.pictures.camera import Camera
 from explore3d.pictures.chart import FONT_SIZE, drawing, image, pixels_png, text_at
@@ -212,12 +213,20 @@ def _maps_seen(
     picture.pixels = picture.pixels[:0].copy()
     coarse = _map_colours(picture, felt, lines, tip_radius, top)
     del picture
-    maps = []
-    for blocks in coarse:
-        colours = blocks.repeat(MAP_PIXELS, axis=0).repeat(MAP_PIXELS, axis=1)[: lit.shape[0], : lit.shape[1]]
-        colours *= 255.0 * (lit / 255.0)
-        maps.append(pixels_png(np.rint(colours, out=colours).astype(np.uint8)))
-    return maps
+    return [pixels_png(_lit_map(blocks, lit)) for blocks in coarse]
+
+
+def _lit_map(blocks: FloatArray, lit: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """(H, W, 3) pixels of a map's blocks of colours, shaded as the light (H, W, 3) falls.
+
+    A row of blocks at a time: as floats all of them are 50 MB in four arrays, on top of the most that a run takes.
+    """
+    drawn = np.empty_like(lit)
+    for row, colours in enumerate(blocks):
+        part = slice(row * MAP_PIXELS, (row + 1) * MAP_PIXELS)
+        shaded = 255.0 * (lit[part] / 255.0) * colours.repeat(MAP_PIXELS, axis=0)[None, : lit.shape[1]]
+        drawn[part] = np.rint(shaded, out=shaded)
+    return drawn
 
 
 def _map_colours(

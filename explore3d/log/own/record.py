@@ -11,6 +11,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from explore3d import UserError, count_text
 from hw import Move
 from mapping import Surface, SurfaceError, Trace
@@ -94,7 +96,7 @@ class Log:
     @cached_property
     def felt_sha256(self) -> str:
         """Of where the centre was, whatever file says it: a simulation that is run again with its seed has the same."""
-        return hashlib.sha256(self.trace.centers.tobytes()).hexdigest()
+        return hashlib.sha256(np.ascontiguousarray(self.trace.centers).data).hexdigest()
 
 
 def merge(logs: Sequence[Log]) -> Log:

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from mapping.estimate.envelope.estimate import Estimate as Estimate
     from mapping.estimate.envelope.profile_envelope import envelope_heights as envelope_heights
     from mapping.estimate.envelope.refuted_tip import RefutedTip as RefutedTip, refuted_tip as refuted_tip
+    from mapping.estimate.envelope.sweep_mesh import sweep_faces as sweep_faces
 
 _PUBLIC = {
     "bent_lines": ("refuted_by_lines",),
@@ -17,5 +18,6 @@ _PUBLIC = {
     "estimate": ("Estimate",),
     "profile_envelope": ("envelope_heights",),
     "refuted_tip": ("RefutedTip", "refuted_tip"),
+    "sweep_mesh": ("sweep_faces",),
 }
 doorway(__name__, _PUBLIC)

@@ -210,7 +210,8 @@ def _contacts(trace: Trace, method: str, outward: FloatArray, slack: float) -> E
     """Contacts of every sweep, and points of the resting ball at its interference points; no mesh yet."""
     moving = np.r_[True, (np.diff(trace.centers, axis=0) != 0).any(axis=1) | (np.diff(trace.sweep) != 0)]
     still = np.flatnonzero(moving)  # a finger that stands still says everything once
-    trace, outward = trace.select(still), outward[still]
+    if len(still) < len(trace):
+        trace, outward = trace.select(still), outward[still]
     rows, sweeps, start = [], [], 0
     for number, part in trace.sweeps():
         own = slice(start, start + len(part))
@@ -219,6 +220,7 @@ def _contacts(trace: Trace, method: str, outward: FloatArray, slack: float) -> E
         sweeps.append(np.full(len(row.centers), number))
         start += len(part)
     row = ContactRow.joined(rows)
+    del rows  # of ten million samples they are 1 GB
     normals, across, doubt = surface_normals(trace, row, outward, slack)
     if method == "contact" and trace.normals is not None:
         normals, doubt = _recorded(trace, row), np.zeros(len(doubt))

@@ -46,8 +46,9 @@ def sweep_faces(points: FloatArray, sweep: IntArray, outward: FloatArray, body: 
     """
     rows = parallel_rows(points, sweep)
     if rows is not None:
-        strips = [zipper(points, first, second) for first, second in pairwise([_looped(points, row) for row in rows])]
-        return oriented(points, np.vstack(strips), outward)
+        # turned strip by strip: of ten million samples the corners and normals of all at once would be 2 GB
+        pairs = pairwise([_looped(points, row) for row in rows])
+        return np.vstack([oriented(points, zipper(points, first, second), outward) for first, second in pairs])
     points = points if body is None else body
     if len(np.unique(points, axis=0)) < 3 or len(points) < 4:
         return np.zeros((0, 3), dtype=np.int64)
@@ -118,7 +119,7 @@ def _place(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
 def oriented(points: FloatArray, faces: IntArray, outward: FloatArray) -> IntArray:
     """The faces, each turned so that it faces its corners' outward direction."""
     a, b, c = (points[faces[:, k]] for k in range(3))
-    up = outward[faces].sum(axis=1)
+    up = outward[faces[:, 0]] + outward[faces[:, 1]] + outward[faces[:, 2]]
     away = np.einsum("ij,ij->i", np.cross(b - a, c - a), up) < 0
     return np.where(away[:, None], faces[:, ::-1], faces)
 

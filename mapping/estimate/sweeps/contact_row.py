@@ -45,8 +45,8 @@ class ContactRow:
         names = [item.name for item in fields(cls)]
         return cls(*(np.concatenate([getattr(row, name) for row in rows]) for name in names))
 
-    def select(self, index: IntArray) -> ContactRow:
-        """The contacts of these indices."""
+    def select(self, index: IntArray | slice) -> ContactRow:
+        """The contacts of these indices; of a slice the arrays are parts of these."""
         return ContactRow(*(getattr(self, item.name)[index] for item in fields(self)))
 
 

@@ -28,6 +28,8 @@ class SweepCurve:
     def of(cls, row: ContactRow) -> SweepCurve:
         """The curve of a row: fans shrink to one node that turns."""
         start = np.r_[True, (np.diff(row.centers, axis=0) != 0).any(axis=1)]
+        if start.all():
+            return cls(row.centers, row.tangents, row.tangents)
         first = np.flatnonzero(start)
         last = np.r_[first[1:] - 1, len(start) - 1]
         return cls(row.centers[first], row.tangents[first], row.tangents[last])

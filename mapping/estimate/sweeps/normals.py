@@ -17,8 +17,9 @@ from mapping.estimate.sweeps.rows import parallel_rows, pitch, thinned
 from mapping.estimate.sweeps.tangents import lagrange, unit
 from mapping.geometry.curvature import TOLD_SIDE
 
-# Samples whose neighbourhoods are fitted together: a bound on the memory that they take
-SAMPLES_AT_ONCE = 4096
+# Samples whose neighbourhoods are fitted together, and points whose normals are computed together: a bound on the
+# memory that they take
+SAMPLES_AT_ONCE, POINTS_AT_ONCE = 4096, 2**14
 # Distance along a sweep between the samples that are fitted, in distances between sweeps. A fit reaches over two and a
 # half of these, and errs as the square of that: between two samples an eighth apart a straight line adds 1/400 of it
 FITTED_APART = 1.0 / 8.0
@@ -42,9 +43,8 @@ def surface_normals(
     own = row.sample >= 0
     along[row.sample[own]] = row.tangents[own]
     rows = parallel_rows(trace.centers, trace.sweep)
-    unknown = np.full(len(trace), np.nan)
     slope = (
-        CrossSlope(along.copy(), unknown, unknown.copy())
+        CrossSlope(along.copy(), *np.full((2, len(trace)), np.nan))
         if rows is None
         else cross_slope(
             trace.centers, along, outward, rows, _curves(trace, row, rows), float(np.sqrt(trace.tip_radius * slack))
@@ -53,12 +53,17 @@ def surface_normals(
     lost = np.flatnonzero(np.isnan(slope.doubt))
     if len(lost):
         slope.tangents[lost], slope.doubt[lost] = _fitted(trace, lost, along, outward)
-    across = slope.tangents[row.nearest]
+    del along, rows
     ends, continued = at_kinks(trace, row, slope.tangents)
-    across[ends] = continued
-    normals = unit(np.cross(row.tangents, across))
-    side = np.sign(np.einsum("ij,ij->i", normals, outward[row.nearest]))
-    normals = np.where((side == 0)[:, None], row.normals, normals * side[:, None])
+    normals = np.empty_like(row.normals)
+    for start in range(0, len(normals), POINTS_AT_ONCE):
+        part = slice(start, start + POINTS_AT_ONCE)
+        across = slope.tangents[row.nearest[part]]
+        within = slice(*np.searchsorted(ends, [start, start + POINTS_AT_ONCE]))
+        across[ends[within] - start] = continued[within]
+        turned = unit(np.cross(row.tangents[part], across))
+        side = np.sign(np.einsum("ij,ij->i", turned, outward[row.nearest[part]]))
+        normals[part] = np.where((side == 0)[:, None], row.normals[part], turned * side[:, None])
     return normals, slope.curvature[row.nearest], slope.doubt[row.nearest]
 
 
@@ -90,7 +95,10 @@ def _curves(trace: Trace, row: ContactRow, rows: list[IntArray]) -> list[SweepCu
     order = np.argsort(sweep, kind="stable")
     names = trace.sweep[[own[0] for own in rows]]
     first, last = (np.searchsorted(sweep[order], names, side=side) for side in ("left", "right"))
-    return [SweepCurve.of(row.select(order[start:stop])) for start, stop in zip(first, last, strict=True)]
+    # sweeps felt one after another are parts of the arrays as they are
+    as_felt = bool((np.diff(order) == 1).all())
+    places = [slice(start, stop) if as_felt else order[start:stop] for start, stop in zip(first, last, strict=True)]
+    return [SweepCurve.of(row.select(place)) for place in places]
 
 
 def _fitted(
@@ -201,30 +209,33 @@ def cross_slope(
     Args:
         least: rows usually nearer than that, m, to the row itself or to one that was taken already are passed over.
     """
-    across = unit(np.cross(outward, along))
-    up = np.cross(along, across)
-    up *= np.sign(np.einsum("ij,ij->i", up, outward))[:, None]
-    slope, bend, doubt = np.full((3, len(points)), np.nan)
+    tangents = np.empty_like(along)
+    curvature, doubt = np.full((2, len(points)), np.nan)
     for j, row in enumerate(rows):
+        # row by row: for all samples at once these would be the largest arrays of all
+        across = unit(np.cross(outward[row], along[row]))
+        up = np.cross(along[row], across)
+        up *= np.sign(np.einsum("ij,ij->i", up, outward[row]))[:, None]
         v, w = np.full((2, len(row), 2 * ROWS_EITHER_SIDE + 1), np.nan)
         v[:, ROWS_EITHER_SIDE] = w[:, ROWS_EITHER_SIDE] = 0.0
         for side in (-1, 1):
             taken, beside = 0, np.zeros(len(row))
             for other in range(j + side, -1 if side < 0 else len(rows), side):
                 arm = curves[other].crossings(points[row], along[row]) - points[row]
-                away = np.einsum("ij,ij->i", arm, across[row])
+                away = np.einsum("ij,ij->i", arm, across)
                 if _usual(np.abs(away - beside)) < least:
                     continue
                 taken, beside = taken + 1, away
                 v[:, ROWS_EITHER_SIDE + side * taken] = away
-                w[:, ROWS_EITHER_SIDE + side * taken] = np.einsum("ij,ij->i", arm, up[row])
+                w[:, ROWS_EITHER_SIDE + side * taken] = np.einsum("ij,ij->i", arm, up)
                 if taken == ROWS_EITHER_SIDE:
                     break
-        slope[row], bend[row], doubt[row] = smooth_slope(v, w)
+        slope, bend, told = smooth_slope(v, w)
         # Beside an outermost sweep nothing shows whether the surface goes on as it came.
         alone = np.isnan(v[:, ROWS_EITHER_SIDE - 1]) | np.isnan(v[:, ROWS_EITHER_SIDE + 1])
-        doubt[row] = shared(np.where(alone & ~np.isnan(doubt[row]), np.pi / 2, doubt[row]))
-    return CrossSlope(unit(across + slope[:, None] * up), -bend / (1 + slope**2) ** 1.5, doubt)
+        doubt[row] = shared(np.where(alone & ~np.isnan(told), np.pi / 2, told))
+        tangents[row], curvature[row] = unit(across + slope[:, None] * up), -bend / (1 + slope**2) ** 1.5
+    return CrossSlope(tangents, curvature, doubt)
 
 
 def _usual(distances: FloatArray) -> float:

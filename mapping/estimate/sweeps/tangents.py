@@ -48,5 +48,5 @@ def tangents(points: FloatArray, cuts: IntArray) -> FloatArray:
 
 def unit(vectors: FloatArray) -> FloatArray:
     """Rows scaled to length one; rows of no length stay zero."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
     return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))

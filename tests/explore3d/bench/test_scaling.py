@@ -55,3 +55,29 @@ def test_finished_sizes_are_not_run_again(tmp_path: Path, monkeypatch):
     assert all(cost.found > 0 and cost.memory > 1e7 for cost in first)
     again = list(bench_scaling.bench_scaling(tmp_path / "store.jsonl", ["triangles"]))
     assert again == first
+
+
+def test_a_surface_under_sweeps_is_timed_and_has_no_holes():
+    cost = bench_scaling.measure("surface", 3_000)
+    assert cost.found == 0
+    assert cost.seconds > 0.0 and cost.stages["meshing all samples"] > 0.0
+
+
+def test_a_ball_follows_the_corrugated_plate_everywhere():
+    trace = bench_scaling.corrugated_sweeps(2_000, 4)
+    row = trace.centers[trace.sweep == 0]
+    x = np.linspace(-1e-3, row[-1, 0] + 1e-3, 20_000)
+    ground = np.column_stack([x, np.zeros_like(x), bench_scaling.SWEPT_HEIGHT * np.sin(2 * np.pi / 8e-3 * x)])
+    nearest = np.array([np.linalg.norm(ground - centre, axis=1).min() for centre in row[::25]])
+    np.testing.assert_allclose(nearest, trace.tip_radius, rtol=1e-6)
+
+
+def test_borders_of_a_mesh_are_counted_with_its_holes():
+    grid = np.arange(25).reshape(5, 5)
+    a, b, c, d = (
+        grid[i, j].ravel()
+        for i, j in [(np.s_[:-1], np.s_[:-1]), (np.s_[1:], np.s_[:-1]), (np.s_[1:], np.s_[1:]), (np.s_[:-1], np.s_[1:])]
+    )
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    assert bench_scaling._borders(faces) == 1
+    assert bench_scaling._borders(np.delete(faces, 5, axis=0)) == 2
