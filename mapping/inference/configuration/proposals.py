@@ -81,7 +81,8 @@ def sections(now: Configuration) -> Iterator[Parts]:
             half = sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
             for share in SKIRTS:
                 yield [*now.parts[:k], as_bell(part, share * half), *now.parts[k + 1 :]]
-        if type(part.shape) is GrooveShape:
+        # beside crests at its rims walls that run out say the same twice
+        if type(part.shape) is GrooveShape and all(kind_of(each.feature).sign < 0 for each in now.parts):
             yield [*now.parts[:k], as_smooth(now.parts, k, now.place), *now.parts[k + 1 :]]
         ridge = _ridge_of(part, now.place)
         if ridge is None or now.as_narrow_as_wires[k]:
