@@ -13,12 +13,14 @@ from mapping.detection import Crossing
 from mapping.estimate.envelope import Estimate
 from mapping.estimate.sweeps import BRIDGED
 from mapping.geometry.mesh import directions, middle, nearest_on
-from mapping.inference.kinds import kind_of
+from mapping.inference.kinds import feature_trace, kind_of
 
 # The section reaches so many half-widths of the disturbance to either side.
 SECTION_REACH = 2.4
 SECTION_BINS = 60
 GRID = 241
+# Share of a feature's height that is not to be seen beside it
+UNSEEN_SHARE = 0.01
 # Sine of the angle at which a sweep must cross a line to show its section: 30 degrees
 LEAST_SINE = 0.5
 # Half-widths, and standard deviations of places along the sweep, by which samples may go back before it has turned: not
@@ -65,6 +67,7 @@ def cross_section(
     base: Base,
     crossings: Sequence[Crossing],
     estimate: Estimate | None = None,
+    others: Sequence[Feature] = (),
 ) -> CrossSection | None:
     """The section along the sweep that crosses nearest to the feature's middle; None if no sweep does.
 
@@ -74,6 +77,7 @@ def cross_section(
         base: the global model.
         crossings: detections on the trace.
         estimate: the estimated surface of the same trace.
+        others: features that the trace shows, too; the feature itself may be among them.
     """
     crossing = _nearest_crossing(feature, trace.tip_radius, crossings)
     window = _window(feature, crossing, trace)
@@ -99,7 +103,8 @@ def cross_section(
     if kind_of(feature).sided:
         curves = _aligned(curves, felt)
     else:  # the level about it is the fit's own: noise that is correlated and drifts move it
-        curves = [curve + float(np.median(felt - curves[0])) for curve in curves]
+        alone = _alone(feature, others, points, normals, trace.tip_radius)
+        curves = [curve + float(np.median((felt - curves[0])[alone])) for curve in curves]
     sweep = int(trace.sweep[window[0]])
     return CrossSection(
         feature,
@@ -253,6 +258,18 @@ def _trace_of(
     details = feature.details if own else replace(feature.details, radius=None)
     so_high = replace(feature, height=Interval(height, height, height), details=details)
     return kind_of(feature).profile(so_high, x, points, normals, tip_radius)
+
+
+def _alone(
+    feature: Feature, others: Sequence[Feature], points: FloatArray, normals: FloatArray, tip_radius: float
+) -> BoolArray:
+    """(N,) True where other features that end leave nothing; everywhere if there is no such place."""
+    left = np.zeros(len(points))
+    for other in others:
+        if other is not feature and kind_of(other).sampled and not kind_of(other).sided:
+            left += np.abs(feature_trace(other, points, normals, tip_radius))
+    alone = left < UNSEEN_SHARE * abs(feature.height.median)
+    return alone if alone.any() else np.ones(len(points), dtype=bool)
 
 
 def _aligned(curves: list[FloatArray], height: FloatArray) -> list[FloatArray]:

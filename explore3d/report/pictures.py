@@ -78,10 +78,11 @@ def shown_features(analysis: Analysis) -> tuple[Feature, ...]:
 def _sections(analysis: Analysis) -> bytes | None:
     trace, crossings = analysis.trace, analysis.detections.crossings
     true = {row.found.id: row.true.height for row in analysis.errors if row.found and row.true}
+    others = analysis.model.features
     sections = [
         found
         for feature in shown_features(analysis)
-        if (found := cross_section(feature, trace, analysis.base, crossings, analysis.estimate)) is not None
+        if (found := cross_section(feature, trace, analysis.base, crossings, analysis.estimate, others)) is not None
     ]
     if not sections:
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from explore3d import count_text
 from explore3d.pictures import corner_picture, cross_section, section_picture
@@ -12,13 +13,16 @@ from mapping.base import Base
 SIZES = ("height", "width", "length")
 
 
-def feature_panel(feature: Feature, base: Base, trace: Trace | None) -> tuple[str, list[bytes]]:
+def feature_panel(
+    feature: Feature, base: Base, trace: Trace | None, others: Sequence[Feature] = ()
+) -> tuple[str, list[bytes]]:
     """Words (Markdown) and pictures (SVG): the profile across the feature where there is a trace, and its posterior.
 
     Args:
         feature: one of a model.
         base: the model's.
         trace: what was recorded; None shows no profile.
+        others: features of the same model.
     """
     lines = [f"### {feature.id}", "", "| | median | 90 % interval |", "|---|---|---|"]
     for name in SIZES:
@@ -30,7 +34,7 @@ def feature_panel(feature: Feature, base: Base, trace: Trace | None) -> tuple[st
     lines += [f"* {note}" for note in feature.notes]
     pictures = []
     if trace is not None:
-        section = cross_section(feature, trace, base, ())
+        section = cross_section(feature, trace, base, (), others=others)
         if section is None:
             lines.append("* no sweep crosses it near its middle: no profile")
         else:

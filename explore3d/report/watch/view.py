@@ -104,7 +104,9 @@ class Watch:
             if name is None or self.model is None:
                 self._words.content = "Click a feature: sizes, evidence, profile, posterior."
                 return
-            words, pictures = feature_panel(self.stage.features[name], self.model.base, self.stage.trace())
+            words, pictures = feature_panel(
+                self.stage.features[name], self.model.base, self.stage.trace(), self.model.features
+            )
             self._words.content = words
             self._pictures = [self.server.gui.add_html(_fitted(each)) for each in pictures]
 

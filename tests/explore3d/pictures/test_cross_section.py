@@ -1,5 +1,7 @@
 """A cross-section shows the trace that was recorded beside the one that the feature predicts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from reported_wire import AXIS, BASE, HEIGHT, TIP, crossing, ridge, sweeps
@@ -87,6 +89,21 @@ def test_the_prediction_lies_on_the_level_of_the_samples_about_it() -> None:
     assert section is not None
     exact = 2e-5 + cap_height(section.grid, HEIGHT, 0.5 * HEIGHT, TIP)
     np.testing.assert_allclose(section.predicted, exact, atol=1e-7)
+
+
+def test_the_level_is_asked_where_no_other_feature_is() -> None:
+    """A wire between two that touch it on both sides: the bare base is less than half of what is shown."""
+    apart = 1.6 * float(np.sqrt(2.0 * TIP * HEIGHT))
+    y = np.arange(-0.02, 0.02, 2e-5)
+    wires = [replace(ridge(), axis=ridge().axis + apart * k * np.array([0.0, 1.0, 0.0])) for k in (-2, -1, 0, 1, 2)]
+    felt = np.max([cap_height(y - apart * k, HEIGHT, 0.5 * HEIGHT, TIP) for k in (-2, -1, 0, 1, 2)], axis=0)
+    trace = Trace(np.arange(float(len(y))), np.column_stack([0 * y, y, TIP + felt]), np.zeros(len(y), dtype=int), TIP)
+    section = cross_section(wires[2], trace, BASE, [], None, wires)
+    assert section is not None
+    exact = cap_height(section.grid, HEIGHT, 0.5 * HEIGHT, TIP)
+    np.testing.assert_allclose(section.predicted, exact, atol=1e-6)
+    unaware = cross_section(wires[2], trace, BASE, [])
+    assert unaware is not None and np.abs(unaware.predicted - exact).max() > 0.1 * HEIGHT
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
