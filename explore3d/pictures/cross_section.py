@@ -19,7 +19,7 @@ from mapping.inference.kinds import feature_trace, kind_of
 SECTION_REACH = 2.4
 SECTION_BINS = 60
 GRID = 241
-# Share of a feature's height that is not to be seen beside it
+# Share of a feature's height that is not to be seen beside it: two pixels of a panel
 UNSEEN_SHARE = 0.01
 # Sine of the angle at which a sweep must cross a line to show its section: 30 degrees
 LEAST_SINE = 0.5

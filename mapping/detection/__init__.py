@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         coverage as coverage,
         face_samples as face_samples,
         found_heights as found_heights,
+        in_cells as in_cells,
         lost_heights as lost_heights,
     )
     from mapping.detection.crossing import Crossing as Crossing
@@ -40,7 +41,15 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "candidates": ("CLEAR",),
-    "coverage": ("Coverage", "FoundHeights", "coverage", "face_samples", "found_heights", "lost_heights"),
+    "coverage": (
+        "Coverage",
+        "FoundHeights",
+        "coverage",
+        "face_samples",
+        "found_heights",
+        "in_cells",
+        "lost_heights",
+    ),
     "crossing": ("Crossing",),
     "detect": ("LARGEST", "SHORTEST_SWEEP_SAMPLES", "Detections", "detect", "expected_limit"),
     "filters.matched_filter": ("LADDER",),

@@ -212,8 +212,24 @@ def face_samples(surface: Surface, spacing: float) -> FaceSamples:
 
 
 def _of_cells(corners: FloatArray, faces: IntArray, longest: FloatArray, spacing: float) -> FaceSamples:
-    """Two points in each of the cells that lines parallel to two sides of a triangle (F, 3, 3) make."""
+    """Two points in each of the cells of triangles (F, 3, 3)."""
     parts = np.clip(np.ceil(longest / spacing), 1, MOST_PARTS).astype(np.int64)
+    points, of = in_cells(corners, parts)
+    return FaceSamples(points, faces[of], (1.0 / parts**2)[of], (0.55 * longest / parts)[of])
+
+
+def in_cells(corners: FloatArray, parts: IntArray) -> tuple[FloatArray, IntArray]:
+    """Two points in each of the cells that lines parallel to two sides of a triangle make.
+
+    What is drawn on bodies at places of chance follows from the order of the points, the example bodies among it.
+
+    Args:
+        corners: (F, 3, 3) of triangles, m.
+        parts: (F,) that a side of each is cut into.
+
+    Returns:
+        Points (N, 3), m, and the numbers (N,) of their triangles; those with fewer parts come first.
+    """
     points, owner = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int64)]
     for n in np.unique(parts):
         alike = np.flatnonzero(parts == n)
@@ -224,8 +240,7 @@ def _of_cells(corners: FloatArray, faces: IntArray, longest: FloatArray, spacing
         weights = np.column_stack([1 - u - v, u, v])
         points.append(np.einsum("sk,fkx->fsx", weights, corners[alike]).reshape(-1, 3))
         owner.append(np.repeat(alike, n * n))
-    of = np.concatenate(owner)
-    return FaceSamples(np.concatenate(points), faces[of], (1.0 / parts**2)[of], (0.55 * longest / parts)[of])
+    return np.concatenate(points), np.concatenate(owner)
 
 
 def _of_columns(corners: FloatArray, faces: IntArray, spacing: float) -> FaceSamples:

@@ -10,6 +10,7 @@ import numpy as np
 from explore3d.analysis import TrueFeature
 from explore3d.bench.scenes.bodies import Mesh
 from mapping import BoolArray, FloatArray, IntArray, Surface
+from mapping.detection import in_cells
 from mapping.geometry.mesh import NearestPoint, nearest_on
 
 # Longest edge within a detail, in widths of it, where its section bulges, which is where the ball touches: at the crest
@@ -230,20 +231,9 @@ class _Ground:
 def _places(body: Surface, spacing: float) -> tuple[FloatArray, IntArray]:
     """Points (N, 3) all over a body whose faces are cut into cells of their own shape, two in each, and their faces.
 
-    Every place of chance follows from their order. The program has samplers of its own, which may change; what lies on
-    the bodies must not.
+    Every place of chance follows from their order: they are cut alike whatever their shape, where the program's own
+    sampler cuts thin faces in another way.
     """
     corners = body.vertices[body.faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    parts = np.ceil(longest / spacing).astype(np.int64)
-    points, face = [], []
-    for n in np.unique(parts):
-        alike = np.flatnonzero(parts == n)
-        i, j = np.divmod(np.arange(n * n), n)
-        flip = i + j >= n
-        u = np.where(flip, n - i - 1 / 3, i + 1 / 3) / n
-        v = np.where(flip, n - j - 1 / 3, j + 1 / 3) / n
-        weights = np.column_stack([1 - u - v, u, v])
-        points.append(np.einsum("sk,fkx->fsx", weights, corners[alike]).reshape(-1, 3))
-        face.append(np.repeat(alike, n * n))
-    return np.concatenate(points), np.concatenate(face)
+    return in_cells(corners, np.ceil(longest / spacing).astype(np.int64))

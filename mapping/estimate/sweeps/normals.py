@@ -18,7 +18,7 @@ from mapping.estimate.sweeps.tangents import lagrange, unit
 from mapping.geometry.curvature import TOLD_SIDE
 
 # Samples whose neighbourhoods are fitted together, and points whose normals are computed together: a bound on the
-# memory that they take
+# memory that they take, 0.4 MB for each array of vectors of so many points
 SAMPLES_AT_ONCE, POINTS_AT_ONCE = 4096, 2**14
 # Distance along a sweep between the samples that are fitted, in distances between sweeps. A fit reaches over two and a
 # half of these, and errs as the square of that: between two samples an eighth apart a straight line adds 1/400 of it

@@ -10,9 +10,11 @@ from numba import njit
 
 from mapping import FloatArray
 
-# Share of the distance on a plane from which what stands on a base is touched, for one that is as hollow as half a ball
+# Share of the distance on a plane, sqrt(2 r H), from which what stands H over a base is touched: on one that is hollow
+# with a radius R it is 1 / sqrt(1 - r / R), 1.41 where R is two balls' radii
 BESIDE_CRESTS = 1.5
-# Squared sine of the angle between two directions that are taken for one
+# Squared sine of the angle between two directions that are taken for one: closer than a millionth they meet a million
+# times farther off than they are apart, and rounding (1e-16) would be told as 1e-10 of that
 ALONG_THE_EDGE = 1e-12
 
 

@@ -9,7 +9,8 @@ from mapping import FloatArray
 # Points of an outline. Between two of them, d apart, the ball rests by d^2 / 8 r lower than on what lies between: by
 # 0.1 um of a groove 4 mm wide under a ball of 3 mm, by 3 um of its last stretch where it runs out
 OUTLINE_POINTS = 41
-# A section that runs out ends where so much of its height is left
+# A section that runs out ends where so much of its height is left: half of the least error of a shape that is reckoned
+# with (MISFIT_SHARES of mapping.inference.configuration)
 LEAST_LEFT = 5e-3
 
 
