@@ -33,8 +33,8 @@ from mapping.inference.sampler import root_of
 
 # A line that was found reaches what was a neighbourhood of its own: both are looked at once more, together
 LOOKS = 2
-# Rounds in which all blocks are laid out beside the others before anything is proposed: held as the rules left them, 2 %
-# off in height, one of the 18 blocks of a page of braille misfits by its neighbours; held as they were laid then, none
+# Rounds in which all blocks are laid out beside the others before anything is proposed: held as the rules left them,
+# 2 % off in height, one of the 18 blocks of a page of braille misfits by its neighbours; held as they were laid, none
 LAID_ROUNDS = 2
 # What is less likely than this is not told
 TOLD_SHARE = 0.01
