@@ -230,6 +230,8 @@ def _along(first: _Run, run: _Run, width: float, noise_level: float) -> _Run | N
     if min(len(first.path), len(run.path)) < 4 * COURSE_LEGS:
         return None
     line, at = first.course
+    if not (np.diff(at) > 0.0).all():  # a ball that rolls over a corner of the body stands on it: that is no line
+        return None
     if (run.points[-1] - run.points[0]) @ (line[-1] - line[0]) < 0.0:
         run = run.backwards
     points, own = run.course

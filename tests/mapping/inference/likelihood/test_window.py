@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mapping.base.base import Base
+from mapping.base.base import Base, Feet
 from mapping.geometry.templates.shapes import cap_height
 from mapping.inference.likelihood.gaussian import Nuisance, build_likelihood
-from mapping.inference.likelihood.window import bin_samples, gather
+from mapping.inference.likelihood.window import Samples, bin_samples, gather
 from mapping.instrument.noise import Noise
 from mapping.surface import Surface
 from mapping.trace import Trace
@@ -127,3 +127,16 @@ def test_a_mean_says_what_its_passes_say(noise: Noise) -> None:
     (place, sd), (other, other_sd) = known
     assert sd == pytest.approx(other_sd, rel=0.03)
     assert abs(place - other) < 0.25 * sd  # what begins a bin in one begins none in the other
+
+
+def test_a_ball_that_stands_on_a_corner_went_along_no_line() -> None:
+    # over a sharp corner the foot stays where it is: means of equal numbers differ by rounding alone
+    corner = np.array([0.010309520936406420, 0.015394459150322603, 0.003670723049944928])
+    onto = corner + np.linspace(-5e-3, 0.0, 19)[:, None] * np.eye(3)[0]
+    along = corner + 4e-3 * np.eye(3)[0] + np.linspace(-1e-3, 6e-3, 139)[:, None] * np.eye(3)[2]
+    points = np.concatenate([onto, np.tile(corner, (19, 1)), along])
+    up, level, shares = np.tile([0.0, 1.0, 0.0], (len(points), 1)), np.zeros(len(points)), np.zeros((len(points), 3))
+    feet = Feet(points, up, level, np.zeros(len(points), dtype=np.int64), shares)
+    sweep, t = np.repeat([0, 1], [38, 139]), 1e-3 * np.arange(len(points))
+    window = bin_samples(Samples(feet, np.array([38]), False, sweep, t), 1e-4, 0.0, 1e-3)
+    assert len(window.starts) == 3 and np.isfinite(window.place).all()
