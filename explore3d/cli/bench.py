@@ -295,7 +295,10 @@ def bodies(
     there = [name for name in chosen if name not in FILED_BODIES or (meshes and (meshes / FILED_BODIES[name]).exists())]
     for name in chosen:
         if name not in there:
-            print(f"{name}: left out, {FILED_BODIES[name]} does not come with the program; give its folder by --meshes")
+            missing = f"is not in {meshes}" if meshes else "does not come with the program; give its folder by --meshes"
+            print(f"{name}: left out, {FILED_BODIES[name]} {missing}")
+    if not there:
+        raise UserError(f"--meshes: nothing of {', '.join(chosen)} is left to explore")
     known = {"reported": BODY_REPORTED_SEEDS, "building": BODY_BUILDING_SEEDS}
     numbers = known[seeds] if seeds in known else tuple(int(number) for number in _numbers(seeds, "--seeds", 1))
     for each in bench_bodies(there, numbers, store, meshes, keep, seconds):

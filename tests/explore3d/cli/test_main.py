@@ -71,6 +71,16 @@ def test_a_bench_refuses_a_store_that_cannot_be_written_before_it_begins(
         assert capsys.readouterr().err.strip().endswith(f"found {found}")
 
 
+def test_bodies_whose_meshes_are_not_there_are_named_and_a_bench_of_none_fails(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    asked = ["bench", "bodies", "--store", tmp_path / "bodies.jsonl", "--bodies", "bunny,spot"]
+    assert explore3d_main(monkeypatch, *asked, "--meshes", tmp_path / "nowhere") == 2
+    told = capsys.readouterr()
+    assert "bunny.off is not in" in told.out and "spot.obj is not in" in told.out
+    assert "nothing of bunny, spot is left to explore" in told.err
+
+
 def variant(folder: Path, old: str, new: str) -> Path:
     """The wire scene with one text replaced, its meshes beside it."""
     text = (SCENES / "wire_on_plate.toml").read_text()
