@@ -36,6 +36,7 @@ class Carrier:
         tip_radius: of the ball, m.
         radius, length: of the stem, m, measured from the ball's centre.
         backing: so far the ball must be able to draw back along the stem, m.
+        backing_room: and so far off the body it must be then, m.
         felt: what is known to stand out of the body; None: nothing is.
     """
 
@@ -44,6 +45,7 @@ class Carrier:
     radius: float
     length: float
     backing: float = 0.0
+    backing_room: float = 0.0
     felt: FeltDetails | None = None
 
     @classmethod
@@ -83,7 +85,7 @@ class Carrier:
         least = height.min(axis=1)
         if self.backing > 0:
             drawn = path - self.backing * approach
-            ball = self.height(drawn, self.tip_radius) + FREE_SINKING * self.tip_radius
+            ball = self.height(drawn, self.tip_radius) + FREE_SINKING * self.tip_radius - self.backing_room
             least = np.minimum(least, np.minimum(ball, replace(self, backing=0.0).clearance(drawn, approach)))
         return np.asarray(least)
 
@@ -122,7 +124,7 @@ class Carrier:
         if self.backing > 0:
             left = np.flatnonzero(free)
             drawn = path[left] - self.backing * approach[left]
-            free[left] = self.ball_is_free(drawn)
+            free[left] = self.ball_is_free(drawn, self.backing_room - FREE_SINKING * self.tip_radius)
             left, drawn = left[free[left]], drawn[free[left]]
             free[left] = replace(self, backing=0.0).is_free(drawn, approach[left])
         return free

@@ -41,7 +41,8 @@ LIFTED_PATH = 0.02 + WALL_ROOM
 def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
     """The stretches of a sweep that ball and stem can make, in their order; the sweep itself if all of it is sound.
 
-    At its ends the finger must be able to draw back.
+    At its ends the finger must be able to draw back, and beside what is not known yet where there is room: in a fold it
+    is drawn back from one wall towards the other.
 
     Args:
         move: a sweep.
@@ -52,15 +53,14 @@ def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
     path, approach = resampled(move.path, move.approach, SOUND_SPACING * carrier.tip_radius)
     free = ball_is_sound(path, approach, carrier.base, carrier.tip_radius)
     tip = carrier.tip_radius
-    roomy = replace(carrier, radius=carrier.radius + DETAIL_ROOM * tip)
-    leaving = replace(carrier, backing=BACK_OFF_DISTANCE * tip)
-    if (free & roomy.is_free(path, approach)).all() and can_be_left(move, carrier):
+    roomy = replace(carrier, radius=carrier.radius + DETAIL_ROOM * tip, backing_room=DETAIL_ROOM * tip)
+    if (free & roomy.is_free(path, approach)).all() and can_be_left(move, roomy):
         return [move]
     for each in (roomy, carrier):
         for run in runs(free):
             approach[run] = each.turned(path[run], approach[run], MOST_TURNED)
     free &= carrier.is_free(path, approach)
-    stretches = (part for run in runs(free) for part in _left(path[run], approach[run], leaving))
+    stretches = (part for run in runs(free) for part in _left(path[run], approach[run], roomy, carrier))
     parts = (replace(move, path=part[0], approach=part[1]) for part in stretches if len(part[0]) > 1)
     return [part for part in parts if part.length >= SHORTEST_PART * tip]
 
@@ -92,19 +92,27 @@ def can_be_left(move: Move, carrier: Carrier) -> bool:
     return bool(leaving.is_free(move.path[ends], move.approach[ends]).all())
 
 
-def _left(path: FloatArray, approach: FloatArray, leaving: Carrier) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _left(
+    path: FloatArray, approach: FloatArray, roomy: Carrier, carrier: Carrier
+) -> Iterator[tuple[FloatArray, FloatArray]]:
     """A stretch's parts between waypoints from which the finger can draw back, turned there if need be.
 
     Args:
         path, approach: (K, 3) of a stretch that is sound.
-        leaving: the stem and the ball drawn back.
+        roomy: the stem with room for what is not known yet; given up where there is none.
+        carrier: the stem.
     """
     near, number = int(np.ceil(LEAVING_STRETCH / SOUND_SPACING)), np.arange(len(path))
+    backing = BACK_OFF_DISTANCE * carrier.tip_radius
+    leaving = replace(carrier, backing=backing)
+    for each in (replace(roomy, backing=backing), leaving):
+        can = each.is_free(path[[0, -1]], approach[[0, -1]])
+        may = ((number < near) & ~can[0]) | ((number >= len(path) - near) & ~can[-1])
+        if may.any():
+            turned = each.turned(path, approach, MOST_TURNED, may)
+            if each is leaving or ball_is_sound(path, turned, carrier.base, carrier.tip_radius).all():
+                approach = turned
     can = leaving.is_free(path, approach)
-    may = ((number < near) & ~can[0]) | ((number >= len(path) - near) & ~can[-1])
-    if may.any():
-        approach = leaving.turned(path, approach, MOST_TURNED, may)
-        can = leaving.is_free(path, approach)
     # what is turned may no longer be pressed against what it was
     turning = 0.5 * (approach[1:] + approach[:-1])
     turning /= np.linalg.norm(turning, axis=1, keepdims=True)

@@ -104,6 +104,25 @@ def test_a_sweep_that_the_finger_could_not_leave_ends_where_it_can() -> None:
     assert sweeps[0].path[-1, 0] > -2e-3  # nothing of what is open is given up
 
 
+def test_a_sweep_ends_where_the_ball_keeps_off_what_it_is_drawn_back_towards() -> None:
+    from trimesh.creation import box
+
+    # a beam beside the stem: drawn back along the floor's normal the ball comes as near to it as 0.05 radii
+    floor, beam = box(extents=(60, 60, 4)), box(extents=(2, 60, 2))
+    floor.apply_translation([0, 0, -2])
+    beam.apply_translation([3.3, 0, 7.65])
+    body = Surface(
+        1e-3 * np.concatenate([floor.vertices, beam.vertices]), np.concatenate([floor.faces, beam.faces + 8])
+    )
+    base, carrier = Base(body), Carrier.of(Base(body), R)
+    along = sweep([0, -10, 2.94], [0, 10, 2.94], np.array([0.0, 0.0, -1.0]))
+    assert can_be_left(along, carrier)
+    (part,) = sound_parts(along, carrier)
+    assert part.length == pytest.approx(along.length)
+    drawn = part.path[[0, -1]] - 0.5 * R * part.approach[[0, -1]]
+    assert base.foot(drawn, R).height.min() > (DETAIL_ROOM - 0.02) * R - 1e-9
+
+
 def test_what_was_refused_is_not_asked_again_until_another_move_was_made() -> None:
     inside, backwards = sweep([30, 3, 5], [30, 3, 35], DOWN), sweep([30, 3, 35], [30, 3, 5], DOWN)
     made, answers, complaints = driven(FLOOR, inside, inside, backwards, FLOOR, inside)
