@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping import BoolArray, FloatArray, IntArray, Surface
-from mapping.geometry.mesh import MovedNearestPoint, NearestPoint
+from mapping.geometry.mesh import CREASE_ANGLE, MovedNearestPoint, NearestPoint
 from mapping.instrument import neighbour_scatter, robust_sd
 
 # The mesh of a fitted base goes on so many tip radii beyond the samples: a foot lies at most one aside of its centre,
@@ -169,6 +169,15 @@ class Base:
     def edge_normals(self) -> FloatArray:
         """(F, 3, 3) mean normal of the faces on either side of the edge opposite to each corner of a face."""
         return self.nearest.edge_normals
+
+    def smooth_normals(self, feet: Feet) -> FloatArray:
+        """(N, 3) outward unit normals under feet of the smooth body that the facets stand for.
+
+        Over an edge of the body they are the directions to the centres.
+        """
+        smooth = self.nearest.smooth_normals(feet.face, feet.barycentric)
+        on_facets = np.einsum("ij,ij->i", smooth, feet.normals) > np.cos(0.5 * CREASE_ANGLE)
+        return np.where(on_facets[:, None], smooth, feet.normals)
 
     def moved(self, rotation: FloatArray, translation: FloatArray, pose: PoseRecord) -> Base:
         """The base after a rigid motion, x to rotation @ x + translation; `pose` is the whole one from its mesh."""

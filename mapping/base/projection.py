@@ -27,7 +27,8 @@ def onto_base(
 
     The foot of a ball's centre lies sideways of it on a mesh: by r sin(0.75 deg) = 0.05 mm for r = 4 mm and facets
     that meet at 1.5 deg. The first foot is sought from above, which tells the two sides of a thin body apart; each
-    further round takes its sideways error out.
+    further round takes its sideways error out. The normals are those of the smooth body that the facets stand for: a
+    ball's centre is r times as far beside what stands on a facet's own as that leans.
 
     Args:
         points: (N, 3) points near the base, m.
@@ -37,8 +38,9 @@ def onto_base(
         smooth: the base's normals are averaged over this many neighbours before and after.
     """
     feet = base.foot(points + tip_radius * normals, tip_radius)
-    sign = np.where(np.einsum("ij,ij->i", feet.normals, normals) < 0.0, -1.0, 1.0)
-    up = averaged(feet.normals * sign[:, None], smooth)
+    smoothed = base.smooth_normals(feet)
+    sign = np.where(np.einsum("ij,ij->i", smoothed, normals) < 0.0, -1.0, 1.0)
+    up = averaged(smoothed * sign[:, None], smooth)
     found, moving = feet.points.copy(), np.ones(len(points), dtype=bool)
     for done in range(MOST_PROJECTION_ROUNDS):
         gap = points - found

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         faces_side as faces_side,
     )
     from mapping.geometry.mesh.nearest import (
+        CREASE_ANGLE as CREASE_ANGLE,
         BoxedPoints as BoxedPoints,
         MovedNearestPoint as MovedNearestPoint,
         NearestPoint as NearestPoint,
@@ -70,7 +71,7 @@ _PUBLIC = {
     "box_kernels": ("MOST_WAITING", "POINTS_PER_BOX", "boxes_about", "nearest_boxed", "nearest_from"),
     "bvh_kernels": ("STACK", "WIDTH", "push_lanes"),
     "clip": ("FELT_SIDE_COSINE", "asked_part", "clipped", "faces_side"),
-    "nearest": ("BoxedPoints", "MovedNearestPoint", "NearestPoint"),
+    "nearest": ("CREASE_ANGLE", "BoxedPoints", "MovedNearestPoint", "NearestPoint"),
     "open3d_import": ("open3d",),
     "polyline": ("arclengths", "directions", "distances", "middle", "nearest_on", "resample"),
     "threads": ("NEAREST_COST", "algebra_in_one_thread", "by_shares", "cores"),

@@ -16,6 +16,9 @@ QUERIES_AT_ONCE = 100_000
 # Points of which a box, of a few in a row, is longer than this share of all are in no order: half of all boxes would be
 # asked at each query, and a tree is quicker
 LONGEST_BOX = 0.5
+# Faces that meet at a vertex and turn from each other by more are sides of an edge of the body, not facets of one of
+# its smooth parts: the angle at which surveys part a mesh into charts, and shaded pictures its edges
+CREASE_ANGLE = float(np.radians(30.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,17 +109,56 @@ class NearestPoint:
         np.add.at(sums, name.ravel(), np.repeat(self.surface.face_normals, 3, axis=0))
         return _unit(sums)[name.ravel()].reshape(-1, 3, 3)
 
+    def smooth_normals(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
+        """(N, 3) unit normals of the smooth body that facets stand for: linear between those of a face's corners.
+
+        A corner's is the mean of those of the faces about it that no crease parts from this one, weighted by their
+        angles there. A facet's own is off by up to half of what it turns against the next one.
+
+        Args:
+            face: (N,) faces in which the places lie.
+            barycentric: (N, 3) their coordinates there.
+
+        Reference: Phong, Communications of the ACM 18, 1975.
+        """
+        asked, row = np.unique(face, return_inverse=True)
+        corners = self._corner_normals(asked)[row.ravel()]
+        return _unit(np.einsum("nc,ncx->nx", barycentric, corners))
+
+    def _corner_normals(self, face: IntArray) -> FloatArray:
+        """(N, 3, 3) of each corner of some faces the mean normal of the faces about it that no crease parts from it."""
+        normals, (order, first) = self.surface.face_normals, self._corners_at
+        vertices = self.surface.faces[face].ravel()
+        count = first[vertices + 1] - first[vertices]
+        begins = np.cumsum(count) - count
+        own = np.repeat(np.arange(len(vertices)), count)
+        beside = order[np.arange(len(own)) + np.repeat(first[vertices] - begins, count)]
+        other = beside // 3
+        alike = np.einsum("ij,ij->i", normals[other], normals[face[own // 3]]) > np.cos(CREASE_ANGLE)
+        sums = np.zeros((len(vertices), 3))
+        np.add.at(sums, own, np.where(alike, self._angles.ravel()[beside], 0.0)[:, None] * normals[other])
+        return _unit(sums).reshape(-1, 3, 3)
+
+    @cached_property
+    def _corners_at(self) -> tuple[IntArray, IntArray]:
+        """(3 F,) corners 3 face + k of all faces, sorted by their vertices, and (V + 1,) the first of each vertex."""
+        vertices = self.surface.faces.ravel()
+        order = np.argsort(vertices, kind="stable")
+        return order, np.searchsorted(vertices[order], np.arange(len(self.surface.vertices) + 1))
+
+    @cached_property
+    def _angles(self) -> FloatArray:
+        """(F, 3) angles of the faces at their corners, rad."""
+        ends = self.surface.vertices[self.surface.faces]
+        u, v = (_unit(np.roll(ends, -k, axis=1) - ends) for k in (1, 2))
+        return np.asarray(np.arccos(np.clip(np.einsum("fcx,fcx->fc", u, v), -1.0, 1.0)))
+
     @cached_property
     def _vertex_normals(self) -> FloatArray:
         """(V, 3) normals weighted by the faces' angles at the vertex."""
-        vertices, faces = self.surface.vertices, self.surface.faces
-        sums = np.zeros_like(vertices)
+        faces, sums = self.surface.faces, np.zeros_like(self.surface.vertices)
         for corner in range(3):
-            here = vertices[faces[:, corner]]
-            u = _unit(vertices[faces[:, (corner + 1) % 3]] - here)
-            v = _unit(vertices[faces[:, (corner + 2) % 3]] - here)
-            angle = np.arccos(np.clip(np.einsum("ij,ij->i", u, v), -1.0, 1.0))
-            np.add.at(sums, faces[:, corner], angle[:, None] * self.surface.face_normals)
+            np.add.at(sums, faces[:, corner], self._angles[:, corner, None] * self.surface.face_normals)
         return _unit(sums)
 
 
@@ -142,6 +184,9 @@ class MovedNearestPoint(NearestPoint):
     @cached_property
     def edge_normals(self) -> FloatArray:
         return np.asarray(self.still.edge_normals @ self.rotation.T)
+
+    def smooth_normals(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
+        return np.asarray(self.still.smooth_normals(face, barycentric) @ self.rotation.T)
 
 
 class BoxedPoints:
@@ -182,5 +227,5 @@ class BoxedPoints:
 
 def _unit(vectors: FloatArray) -> FloatArray:
     """Rows scaled to length one; rows of no length stay zero."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))

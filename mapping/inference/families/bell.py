@@ -131,7 +131,7 @@ class BellRidgeShape:
 
     @cached_property
     def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        return line_nodes(self.window, self.chart, self.modes)
+        return line_nodes(self.window, self.chart, self.modes, self.tip_radius)
 
 
 def bell_ridge_beside(ridge: RidgeShape, sizes: Sizes) -> BellRidgeShape:

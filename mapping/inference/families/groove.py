@@ -77,7 +77,7 @@ class GrooveShape:
     @cached_property
     def places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """Where the nodes of the window lie, as of `line_nodes`."""
-        return line_nodes(self.window, self.chart, self.modes)
+        return line_nodes(self.window, self.chart, self.modes, self.tip_radius)
 
     @cached_property
     def mouths(self) -> tuple[Mouth, ...]:

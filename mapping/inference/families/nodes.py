@@ -14,12 +14,19 @@ NODES = np.array([-1.0, 1.0]) / np.sqrt(3.0)
 
 
 def line_nodes(
-    window: Window, chart: Chart, modes: CurveModes
+    window: Window, chart: Chart, modes: CurveModes, tip: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """(n, nodes) places along and across the chart, (2, m, n, nodes) modes and slopes, and the base's two bends."""
     nodes = bin_nodes(window)
-    s, lateral, leg = chart.coordinates(nodes.reshape(-1, 3))
     shape = nodes.shape[:2]
+    s, _, leg = chart.coordinates(nodes.reshape(-1, 3))
+    points, laterals, normals, _ = chart.at(s)
+    above = ((window.height + tip)[:, None] * window.normals)[:, None]
+    offset = (nodes + above).reshape(-1, 3) - points
+    across, up = np.einsum("ij,ij->i", offset, laterals), np.einsum("ij,ij->i", offset, normals)
+    ahead = np.einsum("ij,ij->i", offset, np.cross(laterals, normals))
+    lateral = _arc(across, up, chart.bend[leg])
+    s = s + _arc(ahead, up, chart.bend_along[leg])
     basis = np.stack([modes.basis(s), modes.slopes(s)]).reshape(2, -1, *shape)
     bend, bend_along = (each[leg].reshape(shape) for each in (chart.bend, chart.bend_along))
     return s.reshape(shape), lateral.reshape(shape), basis, bend, bend_along
@@ -35,9 +42,14 @@ def point_nodes(window: Window, spot: Spot, tip: float) -> tuple[FloatArray, Flo
     x, y, z = centers @ spot.axes[0], centers @ spot.axes[1], centers @ spot.normal
     flat = np.sqrt(np.maximum(x**2 + y**2, np.finfo(float).tiny))
     bend = (x**2 * spot.bends[0] + y**2 * spot.bends[1]) / flat**2
-    turned = np.arctan2(bend * flat, 1.0 + bend * z)
-    longer = np.where(bend == 0.0, 1.0, turned / np.where(bend == 0.0, 1.0, bend * flat))
+    longer = _arc(flat, z, bend) / flat
     return x * longer, y * longer
+
+
+def _arc(aside: FloatArray, up: FloatArray, bend: FloatArray) -> FloatArray:
+    """(n,) length of a circle of curvature `bend` from its top to the foot of a centre beside and above that, m."""
+    turned = np.arctan2(bend * aside, 1.0 + bend * up)
+    return np.asarray(np.where(bend == 0.0, aside, turned / np.where(bend == 0.0, 1.0, bend)))
 
 
 def bin_nodes(window: Window) -> FloatArray:

@@ -50,5 +50,5 @@ class StepShape:
     @cached_property
     def _places(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(n, nodes) lateral distances from the chart, (2, m, n, nodes) modes and slopes, and bends of the base."""
-        _, lateral, basis, bend, _ = line_nodes(self.window, self.chart, self.modes)
+        _, lateral, basis, bend, _ = line_nodes(self.window, self.chart, self.modes, self.tip_radius)
         return lateral, basis, bend

@@ -84,7 +84,7 @@ class TrapezoidShape:
 
     @cached_property
     def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        return line_nodes(self.window, self.chart, self.modes)
+        return line_nodes(self.window, self.chart, self.modes, self.tip_radius)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,10 @@
-"""Points in boxes: the nearest is found wherever the search begins, and in whatever order they come."""
+"""Points in boxes: the nearest is found wherever the search begins, and in whatever order; and smooth normals."""
 
 import numpy as np
 import pytest
 
-from mapping.geometry.mesh import BoxedPoints
+from mapping import Surface
+from mapping.geometry.mesh import BoxedPoints, MovedNearestPoint, NearestPoint
 
 
 @pytest.mark.parametrize("count", [1, 16, 17, 300, 1025])
@@ -27,3 +28,30 @@ def test_what_is_not_within_reach_is_infinitely_far_and_none_of_them() -> None:
     assert 0 < within.sum() < len(within)
     assert (number == np.where(within, apart.argmin(axis=1), len(points))).all()
     np.testing.assert_allclose(distance, np.where(within, apart.min(axis=1), np.inf), rtol=1e-14)
+
+
+def test_smooth_normals_on_facets_are_those_of_the_round_body() -> None:
+    from trimesh.creation import icosphere
+
+    ball = icosphere(subdivisions=2)
+    surface, rng = Surface(ball.vertices, ball.faces), np.random.default_rng(0)
+    face, shares = rng.integers(len(ball.faces), size=500), rng.dirichlet([1.0, 1.0, 1.0], 500)
+    places = np.einsum("nc,ncx->nx", shares, surface.vertices[surface.faces[face]])
+    true = places / np.linalg.norm(places, axis=1, keepdims=True)
+    normals = NearestPoint(surface).smooth_normals(face, shares)
+    facets = np.arccos(np.einsum("ij,ij->i", surface.face_normals[face], true))
+    assert np.degrees(facets.max()) > 7.0
+    assert np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", normals, true), -1.0, 1.0)).max()) < 1.0
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    moved = MovedNearestPoint(surface.moved(turn, np.ones(3)), NearestPoint(surface), turn, np.ones(3))
+    np.testing.assert_allclose(moved.smooth_normals(face, shares), normals @ turn.T, atol=1e-12)
+
+
+def test_an_edge_of_the_body_is_not_smoothed_away() -> None:
+    from trimesh.creation import box
+
+    cube = box(extents=(1.0, 1.0, 1.0))
+    surface = Surface(cube.vertices, cube.faces)
+    face = np.arange(len(cube.faces))
+    normals = NearestPoint(surface).smooth_normals(face, np.tile([0.8, 0.1, 0.1], (len(face), 1)))
+    np.testing.assert_allclose(normals, surface.face_normals, atol=1e-12)
