@@ -34,6 +34,7 @@ from mapping.inference.families import (
     SmoothGrooveShape,
     TrapezoidShape,
     TwinShape,
+    smooth_groove_beside,
 )
 from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 
@@ -81,8 +82,7 @@ def sections(now: Configuration) -> Iterator[Parts]:
             half = sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
             for share in SKIRTS:
                 yield [*now.parts[:k], as_bell(part, share * half), *now.parts[k + 1 :]]
-        # beside crests at its rims walls that run out say the same twice
-        if type(part.shape) is GrooveShape and all(kind_of(each.feature).sign < 0 for each in now.parts):
+        if type(part.shape) is GrooveShape and not _has_crests_at_rims(part, now):
             yield [*now.parts[:k], as_smooth(now.parts, k, now.place), *now.parts[k + 1 :]]
         ridge = _ridge_of(part, now.place)
         if ridge is None or now.as_narrow_as_wires[k]:
@@ -98,6 +98,12 @@ def sections(now: Configuration) -> Iterator[Parts]:
                 yield [*now.parts[:k], other, *now.parts[k + 1 :]]
 
 
+def _has_crests_at_rims(groove: Part, now: Configuration) -> bool:
+    """True of a groove beside which crests run: what they leave walls that run out would say a second time."""
+    lines = [part for part in now.parts if part is not groove and kind_of(part.feature).line]
+    return any(kind_of(line.feature).sign > 0 and _faces(groove, line, now.place) for line in lines)
+
+
 def without(now: Configuration) -> Iterator[Parts]:
     """One detail less."""
     for k in range(len(now.parts)):
@@ -105,7 +111,10 @@ def without(now: Configuration) -> Iterator[Parts]:
 
 
 def joined(now: Configuration) -> Iterator[Parts]:
-    """Two details as one line: end to end, a line and a point that is more of it, or two lines side by side."""
+    """Two details as one line: end to end, a line and a point that is more of it, or two lines side by side.
+
+    The whole has the section of its pieces.
+    """
     for one, other in itertools.combinations(range(len(now.parts)), 2):
         first, second = now.parts[one], now.parts[other]
         lines = [axis_of(first), axis_of(second)]
@@ -113,15 +122,13 @@ def joined(now: Configuration) -> Iterator[Parts]:
         made_of = kind_of(first.feature).made_of
         if made_of and made_of == kind_of(second.feature).made_of:
             whole = _straight_through(np.concatenate(lines))
-            like = max(first, second, key=lambda part: kind_of(part.feature).line).feature
-            like = replace(like, kind=kind_made_of(made_of, line=True).name)
-            line = _line(like, whole, now.place)
-            yield [*rest, line]
-            if any(isinstance(part.shape, SmoothGrooveShape) for part in (first, second)):
-                yield [*rest, as_smooth([*rest, line], len(rest), now.place)]
-            if min(len(line) for line in lines) == 1:  # a sweep that passes beyond an end feels it, too
-                short = _shortened(whole, lines[0 if len(lines[0]) == 1 else 1][0], like, now.place)
-                yield [*rest, _line(like, short, now.place)]
+            as_line = replace(first.feature, kind=kind_made_of(made_of, line=True).name)
+            alike = {type(part.shape): part for part in (second, first) if kind_of(part.feature).line}
+            for like in alike.values() or [replace(first, feature=as_line)]:
+                yield [*rest, _alike(like, whole, now.place)]
+                if min(len(line) for line in lines) == 1:  # a sweep that passes beyond an end feels it, too
+                    short = _shortened(whole, lines[0 if len(lines[0]) == 1 else 1][0], like.feature, now.place)
+                    yield [*rest, _alike(like, short, now.place)]
         if min(len(line) for line in lines) < 2:
             continue
         if not _faces(first, second, now.place):
@@ -139,7 +146,11 @@ def joined(now: Configuration) -> Iterator[Parts]:
 
 
 def chained(now: Configuration) -> Iterator[Parts]:
-    """All pieces of one course as one line, open and closed: rows leave a ring in pieces where they run along it."""
+    """All pieces of one course as one line, open and closed: rows leave a ring in pieces where they run along it.
+
+    The whole has the section of the piece that stands out most: another's would have to be found anew, and until it is
+    the whole is less likely than the pieces.
+    """
     kinds = {kind_of(part.feature).made_of for part in now.parts} - {""}
     for made_of in sorted(kinds):
         if not kind_made_of(made_of, line=True).has_ends:
@@ -149,17 +160,18 @@ def chained(now: Configuration) -> Iterator[Parts]:
         course, used = _course_of([axis_of(now.parts[k]) for k in alike])
         if not used:
             continue
-        pieces = [now.parts[alike[k]].feature for k in used]
+        pieces = [now.parts[alike[k]] for k in used]
         rest = [part for k, part in enumerate(now.parts) if k not in {alike[m] for m in used}]
-        like = max(pieces, key=lambda piece: (kind_of(piece).line, piece.evidence.snr))
-        support = replace(like.evidence, crossings=sum(piece.evidence.crossings for piece in pieces))
-        like = replace(like, evidence=support)
+        like = max(pieces, key=lambda piece: (kind_of(piece.feature).line, piece.feature.evidence.snr))
+        crossings = sum(piece.feature.evidence.crossings for piece in pieces)
+        support = replace(like.feature.evidence, crossings=crossings)
+        like = replace(like, feature=replace(like.feature, evidence=support))
         courses = [course] if len(used) > 1 else []
         if float(np.linalg.norm(course[-1] - course[0])) < CLOSING_GAP * float(arclengths(course)[-1]):
             courses.append(np.vstack([course, course[:1]]))
         for each, degree in itertools.product(courses, (*LOWER_DEGREES, HIGHEST_DEGREE)):
             try:
-                line = _line(like, each, now.place, degree, degree)
+                line = _alike(like, each, now.place, degree, degree)
             except MappingError:  # pieces that are of no course: as smooth as that it turns back, or leaves the base
                 continue
             yield [*rest, line]
@@ -318,7 +330,10 @@ def _alike(part: Part, axis: FloatArray, place: Neighbourhood, most: int = HIGHE
     if isinstance(shape, BellRidgeShape):
         return as_bell(line, float(np.exp(part.start[-2])))
     if isinstance(shape, SmoothGrooveShape):
-        return as_smooth([line], 0, place)
+        upright: Any = line.shape
+        smooth = smooth_groove_beside(upright, sizes_of(part.feature, shape.tip_radius))
+        section = shape.names.index("log half width") - len(shape.names)
+        return Part(line.feature, smooth, np.concatenate([smooth.start[:section], part.start[section:]]))
     return line
 
 

@@ -23,9 +23,17 @@ from mapping.base import Base, LaidTrace
 from mapping.detection import detect
 from mapping.inference.configuration import Places, in_words, numbers_in, share_as_told
 from mapping.inference.configuration.account import ENDED_EARLY, IN_BLOCKS, accounted
-from mapping.inference.configuration.configuration import Configuration, Part, as_bar, fitted, part_of
+from mapping.inference.configuration.configuration import (
+    Configuration,
+    Part,
+    as_bar,
+    as_smooth,
+    fitted,
+    laid,
+    part_of,
+)
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood, window_of
-from mapping.inference.configuration.proposals import smoother, straight_lines
+from mapping.inference.configuration.proposals import chained, joined, smoother, straight_lines
 from mapping.inference.configuration.search import searched
 from mapping.inference.families import SmoothGrooveShape, Surroundings
 from mapping.inference.joint import JoinedShape
@@ -153,6 +161,24 @@ def test_a_line_laid_as_it_was_felt_is_asked_for_fewer_bends() -> None:
     best = max(others, key=lambda other: other.log_odds)
     assert best.log_odds > start.log_odds + 5.0
     assert len(best.shape.names) < len(start.shape.names)
+
+
+def test_pieces_of_a_line_are_joined_with_their_section() -> None:
+    body = "burred groove"
+    groove = next(_true(true) for true in classified_body(body, FIRST_BUILT_WITH).truth if true.kind == "groove")
+    middle, up = groove.axis[[0, -1]].mean(axis=0), np.tile([0.0, 0.0, 1.0], (2, 1))
+    pieces = [
+        replace(groove, axis=np.stack([groove.axis[0], middle - 1e-3 * np.eye(3)[0]]), normals=up),
+        replace(groove, axis=np.stack([middle + 1e-3 * np.eye(3)[0], groove.axis[-1]]), normals=up),
+    ]
+    place = _weighed_on(body, [groove])
+    first = as_smooth([part_of(pieces[0], place)], 0, place)
+    now = laid([first, part_of(pieces[1], place)], place)
+    for proposal in (chained, joined):
+        wholes = [parts[0] for parts in proposal(now) if len(parts) == 1]
+        assert any(type(whole.shape) is SmoothGrooveShape for whole in wholes)
+        smooth = next(whole for whole in wholes if type(whole.shape) is SmoothGrooveShape)
+        np.testing.assert_array_equal(smooth.start[-3:], first.start[-3:])
 
 
 def test_samples_as_far_apart_as_places_were_felt_at_points() -> None:
