@@ -21,8 +21,10 @@ from mapping.instrument import Noise
 # How wrong the shapes of a configuration may be about a real detail, in shares of its height: which of these it is the
 # data say. In parts of a fifteenth of a half-width w the mean of what is the higher of two crests is off by up to the
 # change of slope times an eighth of a part, (2 H / w) (w / 15) / 8 = 0.02 H, in one part of a crossing; facets of a
-# round crest (24 to its circle) are 0.004 H inside it; 0.04 is SHAPE_ERROR, what crests that were touched showed
-MISFIT_SHARES = (0.01, 0.04)
+# round crest (24 to its circle) are 0.004 H inside it; 0.04 is SHAPE_ERROR, what crests that were touched showed.
+# Coarse facets, which turn by up to 13 degrees under a groove of the double ring, put the ball up to a sixth of the
+# depth off what a smooth base would let it feel: 0.08 is twice the rms of that along the groove
+MISFIT_SHARES = (0.01, 0.04, 0.08)
 # Places so many half-widths beside a crest belong to its window: as many again as it disturbs, which tell the base
 NEIGHBOURHOOD_REACH = 2.0
 # Parts of a bin: where the higher of two crests changes within one, the mean of both heights misses a ninth of what it
