@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,12 +24,11 @@ from mapping.estimate.sweeps import (
     ContactRow,
     Directions,
     Smoothed,
+    SurfaceNormals,
     at_kinks,
-    contact_row,
     in_plane,
     pitch,
     smooth,
-    surface_normals,
     thinned,
     unit,
 )
@@ -49,6 +48,9 @@ CAUTION = 2.0
 STEPS_TOLERATED = 2.0
 # More points of a mesh than this cost memory and minutes of curvature, on bodies that no picture shows so finely.
 MOST_POINTS = 300_000
+# Contacts that are laid out together before they are thinned: 60 MB with all that is known of them. One sweep of few
+# samples at a time would take as long again for the calls alone
+CONTACTS_AT_ONCE = 2**18
 
 
 def estimate_surface(
@@ -112,17 +114,8 @@ def estimate_surface(
     if method == "alpha":
         estimate = alpha_estimate(balls, tolerance)
         return estimate if smoothed is None else replace(estimate, sd=smoothed.sd)
-    points = _contacts(trace, method, away, slack)
-    if smoothed is not None:
-        points = _dented(points, smoothed)
     depth = penetration_below(trace.centers, trace.tip_radius)
-    possible = depth(points.points, slack) <= slack
-    if not possible.any():
-        raise EnvelopeError("every contact lies inside another ball: the trace is no ball's path; give its noise")
-    points = points.select(np.flatnonzero(possible))
-    step = _step(points, pitch(trace.centers, trace.sweep)) if spacing is None else spacing
-    # Thinned by their own distances, and by their balls': over a sharp edge many balls share one contact.
-    points = points.select(thinned(points.points, points.sweep, step, _bounding(points)))
+    points = _possible(_contacts(trace, method, away, slack, smoothed), depth, slack, _Thinning.of(trace, spacing))
     estimate, faces, resting = _meshed(points, trace.tip_radius, slack, depth)
     estimate = _proven(estimate, faces, resting, balls, smoothed, tolerance)
     if smoothed is None:
@@ -182,10 +175,74 @@ def _resolution(estimate: Estimate, count: int, balls: Balls) -> float:
     return STEPS_TOLERATED * (apart + 2 * float(np.sqrt(balls.tip_radius * balls.slack)))
 
 
-def _step(points: Estimate, apart: float) -> float:
-    """Distance between points along sweeps that lie so far apart, m; 0 takes all."""
-    length = float(np.linalg.norm(np.diff(points.points, axis=0), axis=1).sum())
-    return max(apart / 4, length / MOST_POINTS) if apart > 0 else 0.0
+@dataclass
+class _Thinning:
+    """Points of sweeps as they come, thinned to a distance along them.
+
+    Args:
+        step: distance, m; 0 keeps all.
+        given: True if it was asked for; else more than MOST_POINTS are thinned out further.
+        length: along all points so far, m.
+        last: the last point.
+    """
+
+    step: float
+    given: bool
+    length: float = 0.0
+    last: FloatArray | None = None
+
+    @classmethod
+    def of(cls, trace: Trace, spacing: float | None) -> _Thinning:
+        """To what was asked for, or a quarter of the distance between the sweeps."""
+        return cls(pitch(trace.centers, trace.sweep) / 4, False) if spacing is None else cls(spacing, True)
+
+    def thin(self, points: Estimate) -> Estimate:
+        """The next points thinned by their own distances, not by their balls': over a sharp edge many balls share one
+        contact."""
+        if not len(points.points):
+            return points
+        way = points.points if self.last is None else np.vstack([self.last, points.points])
+        self.length += float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+        self.last = points.points[-1]
+        return points.select(thinned(points.points, points.sweep, self.step, _bounding(points)))
+
+    def all_of_them(self, points: Estimate) -> Estimate:
+        """All points that were thinned, no more of them than anybody sees."""
+        least = self.length / MOST_POINTS
+        if self.given or self.step >= least or self.step == 0:
+            return points
+        return points.select(thinned(points.points, points.sweep, least, _bounding(points)))
+
+
+def _possible(
+    sweeps: Iterable[Estimate], depth: Callable[[FloatArray, float], FloatArray], slack: float, thinning: _Thinning
+) -> Estimate:
+    """The contacts that lie in no other ball, thinned; some sweeps at a time, so that only these are ever held.
+
+    Raises:
+        EnvelopeError: no contact is possible.
+    """
+    kept, sweeps = list[Estimate](), iter(sweeps)
+    while some := _some(sweeps):
+        points = Estimate.joined(some)
+        possible = depth(points.points, slack) <= slack
+        kept.append(thinning.thin(points.select(np.flatnonzero(possible))))
+    points = Estimate.joined(kept)
+    if not len(points.points):
+        raise EnvelopeError("every contact lies inside another ball: the trace is no ball's path; give its noise")
+    return thinning.all_of_them(points)
+
+
+def _some(sweeps: Iterator[Estimate]) -> list[Estimate]:
+    """The next sweeps with CONTACTS_AT_ONCE contacts or a few more; none at the end."""
+    taken: list[Estimate] = []
+    count = 0
+    for sweep in sweeps:
+        taken.append(sweep)
+        count += len(sweep.points)
+        if count >= CONTACTS_AT_ONCE:
+            break
+    return taken
 
 
 def _directions(trace: Trace, base: Base | None, outward: ArrayLike | None) -> FloatArray | Directions:
@@ -206,30 +263,30 @@ def _outward(trace: Trace, base: Base | None, outward: ArrayLike | None) -> Floa
     return np.array(np.broadcast_to([0.0, 0.0, 1.0], trace.centers.shape))
 
 
-def _contacts(trace: Trace, method: str, outward: FloatArray, slack: float) -> Estimate:
-    """Contacts of every sweep, and points of the resting ball at its interference points; no mesh yet."""
+def _contacts(
+    trace: Trace, method: str, outward: FloatArray, slack: float, smoothed: Smoothed | None
+) -> Iterator[Estimate]:
+    """Contacts of one sweep after another, and points of the resting ball at its interference points; no mesh yet."""
     moving = np.r_[True, (np.diff(trace.centers, axis=0) != 0).any(axis=1) | (np.diff(trace.sweep) != 0)]
-    still = np.flatnonzero(moving)  # a finger that stands still says everything once
-    if len(still) < len(trace):
+    still = None
+    if not moving.all():  # a finger that stands still says everything once
+        still = np.flatnonzero(moving)
         trace, outward = trace.select(still), outward[still]
-    rows, sweeps, start = [], [], 0
-    for number, part in trace.sweeps():
-        own = slice(start, start + len(part))
-        row = contact_row(part.centers, outward[own], trace.tip_radius, open_kinks=method != "normals")
-        rows.append(replace(row, sample=np.where(row.sample < 0, -1, row.sample + start), nearest=row.nearest + start))
-        sweeps.append(np.full(len(row.centers), number))
-        start += len(part)
-    row = ContactRow.joined(rows)
-    del rows  # of ten million samples they are 1 GB
-    normals, across, doubt = surface_normals(trace, row, outward, slack)
-    if method == "contact" and trace.normals is not None:
-        normals, doubt = _recorded(trace, row), np.zeros(len(doubt))
-    # A ball turned by an angle about its contact leaves the body by half of r angle^2.
-    uncertain = (row.labels == TOUCHED) & (0.5 * trace.tip_radius * (CAUTION * doubt) ** 2 > slack)
-    labels = np.where(uncertain, EXTRAPOLATED, row.labels).astype(np.int8)
-    sample = np.where(row.sample < 0, -1, still[row.sample])
-    points = row.centers - trace.tip_radius * normals
-    return Estimate.unproven(points, normals, row.centers, labels, sample, np.concatenate(sweeps), across)
+    del moving
+    surface = SurfaceNormals(trace, outward, slack, open_kinks=method != "normals")
+    for number, part in enumerate(surface.parts):
+        row, normals, across, doubt = surface.of(number)
+        if method == "contact" and part.normals is not None:
+            normals, doubt = _recorded(part, row), np.zeros(len(doubt))
+        # A ball turned by an angle about its contact leaves the body by half of r angle^2.
+        uncertain = (row.labels == TOUCHED) & (0.5 * trace.tip_radius * (CAUTION * doubt) ** 2 > slack)
+        labels = np.where(uncertain, EXTRAPOLATED, row.labels).astype(np.int8)
+        sample = np.where(row.sample < 0, -1, row.sample + surface.starts[number])
+        if still is not None:
+            sample = np.where(sample < 0, -1, still[sample])
+        points, sweep = row.centers - trace.tip_radius * normals, np.full(len(sample), part.sweep[0])
+        found = Estimate.unproven(points, normals, row.centers, labels, sample, sweep, across)
+        yield found if smoothed is None else _dented(found, smoothed)
 
 
 def _bounding(points: Estimate) -> BoolArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -69,6 +70,14 @@ class Estimate:
         """Points without a mesh of which nothing is proven yet."""
         unknown = np.full(len(points), np.inf)
         return cls(None, points, normals, centers, labels, sample, sweep, across, unknown, unknown.copy())
+
+    @classmethod
+    def joined(cls, parts: Sequence[Estimate]) -> Estimate:
+        """The points of one or more estimates one after another, without a mesh."""
+        of_points: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in parts]) for name in _OF_POINTS
+        }
+        return replace(parts[0], surface=None, **of_points)
 
     def fraction(self, label: int) -> float:
         """Share of the points that carry a label."""

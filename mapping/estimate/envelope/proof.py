@@ -64,7 +64,7 @@ class Balls:
             boxed.points,
             boxed.boxes,
             read_only(self.sweep),
-            read_only(unit(self.outward)),
+            read_only(unit(self.outward[np.maximum(spot, 0)])),
             read_only(nothing if across is None else across),
             float(self.tip_radius),
             float(self.slack),

@@ -109,7 +109,8 @@ def proven_reach(  # type: ignore[no-untyped-def]
         owners: (M, P) indices of vertices whose balls are asked, -1 for none.
         spot: (V,) sample of each vertex, -1 where it has none that is known to touch.
         starts, ring: neighbours of vertex v are ring[starts[v] : starts[v + 1]].
-        centers, sweep, outward: (N, 3), (N,) and (N, 3) of the samples, outward of length one.
+        centers, sweep: (N, 3) and (N,) of the samples.
+        outward: (V, 3) of length one, of the vertices' samples.
         laid, boxes: the centres once more, and the boxes about them (see `nearest_boxed`).
         across: (V, 3) unit vectors across a lone sweep, in whose plane the contact is taken to be; else (0, 3).
         slack: by which two balls may overlap a contact of either, m.
@@ -163,7 +164,7 @@ def _constraints(  # type: ignore[no-untyped-def]
     v, s, spot, starts, ring, centers, sweep, outward, across, radius, slack, axes, bounds
 ):
     """Write what bounds the direction from the ball of sample s to its contact; how many bounds there are."""
-    axes[0], bounds[0] = outward[s], 0.0
+    axes[0], bounds[0] = outward[v], 0.0
     count = 1
     if len(across):
         axes[1], bounds[1] = across[v], 0.0

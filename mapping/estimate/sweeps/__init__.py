@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         LABELS as LABELS,
         TOUCHED as TOUCHED,
     )
-    from mapping.estimate.sweeps.normals import at_kinks as at_kinks, surface_normals as surface_normals
+    from mapping.estimate.sweeps.normals import SurfaceNormals as SurfaceNormals, at_kinks as at_kinks
     from mapping.estimate.sweeps.rows import parallel_rows as parallel_rows, pitch as pitch, thinned as thinned
     from mapping.estimate.sweeps.smoothing import Directions as Directions, Smoothed as Smoothed, smooth as smooth
     from mapping.estimate.sweeps.tangents import unit as unit
@@ -32,7 +32,7 @@ _PUBLIC = {
     "contact_row": ("ContactRow", "contact_row", "in_plane"),
     "curvature": ("CurvatureFeature", "curvature_along", "features_beyond", "half_width_for", "joined"),
     "labels": ("BRIDGED", "EXTRAPOLATED", "LABELS", "TOUCHED"),
-    "normals": ("at_kinks", "surface_normals"),
+    "normals": ("SurfaceNormals", "at_kinks"),
     "rows": ("parallel_rows", "pitch", "thinned"),
     "smoothing": ("Directions", "Smoothed", "smooth"),
     "tangents": ("unit",),

@@ -5,66 +5,114 @@ Along a sweep its own tangent tells; across the sweeps the slope comes from the 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray, Trace
-from mapping.estimate.sweeps.contact_row import ContactRow
+from mapping.estimate.sweeps.contact_row import ContactRow, contact_row
 from mapping.estimate.sweeps.curve import SweepCurve
 from mapping.estimate.sweeps.labels import TOUCHED
 from mapping.estimate.sweeps.rows import parallel_rows, pitch, thinned
 from mapping.estimate.sweeps.tangents import lagrange, unit
 from mapping.geometry.curvature import TOLD_SIDE
 
-# Samples whose neighbourhoods are fitted together, and points whose normals are computed together: a bound on the
-# memory that they take, 0.4 MB for each array of vectors of so many points
-SAMPLES_AT_ONCE, POINTS_AT_ONCE = 4096, 2**14
+# Samples whose neighbourhoods are fitted together: a bound on the memory that they take
+SAMPLES_AT_ONCE, FITTED_NEIGHBOURS = 4096, 24
+# Sweeps whose curves are held: those that a slope is taken across are nine, and more where passes over one line lie
+# between them
+CURVES_HELD = 32
 # Distance along a sweep between the samples that are fitted, in distances between sweeps. A fit reaches over two and a
 # half of these, and errs as the square of that: between two samples an eighth apart a straight line adds 1/400 of it
 FITTED_APART = 1.0 / 8.0
 
 
-def surface_normals(
-    trace: Trace, row: ContactRow, outward: FloatArray, slack: float = 0.0
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Outward unit normals (M, 3) at the points of `row`, curvature across (M,), 1/m, and doubt of the slope (M,), rad.
+class SurfaceNormals:
+    """Contacts of the traced surface's sweeps with normals, one part after another.
 
     A single sweep knows its slope along itself only: its normals stay in the plane of tangent and outward
     direction, as of a profile. Parallel sweeps add the slope across; other arrangements take it from local fits.
 
+    What is worked out for one part is let go of before the next but for its neighbours' curves: for all samples at
+    once it would take five times the trace's own memory.
+
     Args:
+        trace: each run of consecutive samples with one number is taken by itself, `parts` of it.
+        outward: (N, 3) directions away from the body at its samples.
         slack: what noise moves a centre by at most, m. Sweeps whose balls would stand out between them by less than
             an eighth of it are passes over one line: they tell no slope across.
+        open_kinks: False to take interference points for samples like others.
     """
-    if len(np.unique(trace.sweep)) < 2:
-        return row.normals, np.full(len(row.normals), np.nan), np.zeros(len(row.normals))
-    along = np.zeros_like(trace.centers)
-    own = row.sample >= 0
-    along[row.sample[own]] = row.tangents[own]
-    rows = parallel_rows(trace.centers, trace.sweep)
-    slope = (
-        CrossSlope(along.copy(), *np.full((2, len(trace)), np.nan))
-        if rows is None
-        else cross_slope(
-            trace.centers, along, outward, rows, _curves(trace, row, rows), float(np.sqrt(trace.tip_radius * slack))
-        )
-    )
-    lost = np.flatnonzero(np.isnan(slope.doubt))
-    if len(lost):
-        slope.tangents[lost], slope.doubt[lost] = _fitted(trace, lost, along, outward)
-    del along, rows
-    ends, continued = at_kinks(trace, row, slope.tangents)
-    normals = np.empty_like(row.normals)
-    for start in range(0, len(normals), POINTS_AT_ONCE):
-        part = slice(start, start + POINTS_AT_ONCE)
-        across = slope.tangents[row.nearest[part]]
-        within = slice(*np.searchsorted(ends, [start, start + POINTS_AT_ONCE]))
-        across[ends[within] - start] = continued[within]
-        turned = unit(np.cross(row.tangents[part], across))
-        side = np.sign(np.einsum("ij,ij->i", turned, outward[row.nearest[part]]))
-        normals[part] = np.where((side == 0)[:, None], row.normals[part], turned * side[:, None])
-    return normals, slope.curvature[row.nearest], slope.doubt[row.nearest]
+
+    def __init__(self, trace: Trace, outward: FloatArray, slack: float = 0.0, open_kinks: bool = True) -> None:
+        self.trace, self.outward = trace, outward
+        self._least = float(np.sqrt(trace.tip_radius * slack))
+        self.parts = [part for _, part in trace.sweeps()]
+        self.starts = np.cumsum([0, *map(len, self.parts)])
+        self._outwards = np.split(outward, self.starts[1:-1])
+        numbers = [int(part.sweep[0]) for part in self.parts]
+        self._lone = len({*numbers}) < 2
+        rows = None if self._lone else parallel_rows(trace.centers, trace.sweep)
+        places = {} if rows is None else {int(trace.sweep[row[0]]): j for j, row in enumerate(rows)}
+        # the row that each sweep is a part of, from side to side, and the sweeps of each row
+        self._row_of_part = [places.get(number, -1) for number in numbers]
+        self._parts_of_row: list[list[int]] = [[] for _ in places]
+        for k, row in enumerate(self._row_of_part):
+            if row >= 0:
+                self._parts_of_row[row].append(k)
+        self._row, self._curve = _held_rows(self.parts, self._outwards, self._parts_of_row, open_kinks)
+
+    def of(self, number: int) -> tuple[ContactRow, FloatArray, FloatArray, FloatArray]:
+        """Contacts of one of the parts, whose sample numbers are its own, outward unit normals (M, 3), curvature across
+        (M,), 1/m, and doubt of the slope (M,), rad."""
+        row, trace, outward = self._row(number), self.parts[number], self._outwards[number]
+        if self._lone:
+            return row, row.normals, np.full(len(row.normals), np.nan), np.zeros(len(row.normals))
+        along = np.zeros_like(trace.centers)
+        felt = row.sample >= 0
+        along[row.sample[felt]] = row.tangents[felt]
+        if self._parts_of_row:
+            before, after = self._beside(self._row_of_part[number])
+            slope = cross_slope(trace.centers, along, outward, before, after, self._least)
+        else:
+            slope = CrossSlope(along.copy(), *np.full((2, len(trace)), np.nan))
+        lost = np.flatnonzero(np.isnan(slope.doubt))
+        if len(lost):
+            slope.tangents[lost], slope.doubt[lost] = self._near.fitted(trace.centers[lost], along[lost], outward[lost])
+        across = slope.tangents[row.nearest]
+        ends, continued = at_kinks(trace, row, slope.tangents)
+        across[ends] = continued
+        turned = unit(np.cross(row.tangents, across))
+        side = np.sign(np.einsum("ij,ij->i", turned, outward[row.nearest]))
+        normals = np.where((side == 0)[:, None], row.normals, turned * side[:, None])
+        return row, normals, slope.curvature[row.nearest], slope.doubt[row.nearest]
+
+    def _beside(self, row: int) -> tuple[Iterator[SweepCurve], Iterator[SweepCurve]]:
+        """The curves of the rows on either side, the nearest first."""
+        return map(self._curve, range(row - 1, -1, -1)), map(self._curve, range(row + 1, len(self._parts_of_row)))
+
+    @cached_property
+    def _near(self) -> _Neighbourhood:
+        return _Neighbourhood(self.trace, self.outward)
+
+
+def _held_rows(
+    parts: list[Trace], outwards: list[FloatArray], parts_of_row: list[list[int]], open_kinks: bool
+) -> tuple[Callable[[int], ContactRow], Callable[[int], SweepCurve]]:
+    """What gives the contacts of a part, and the curve of a row; the latest are held, the others laid out again."""
+
+    @lru_cache(CURVES_HELD)
+    def contacts(number: int) -> ContactRow:
+        part = parts[number]
+        return contact_row(part.centers, outwards[number], part.tip_radius, open_kinks)
+
+    @lru_cache(CURVES_HELD)
+    def curve(row: int) -> SweepCurve:
+        return SweepCurve.of(ContactRow.joined([contacts(number) for number in parts_of_row[row]]))
+
+    return contacts, curve
 
 
 def at_kinks(trace: Trace, row: ContactRow, directions: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -89,49 +137,39 @@ def at_kinks(trace: Trace, row: ContactRow, directions: FloatArray) -> tuple[Int
     return np.asarray(ends, dtype=np.int64), unit(np.einsum("km,kmc->kc", weights, directions[samples]))
 
 
-def _curves(trace: Trace, row: ContactRow, rows: list[IntArray]) -> list[SweepCurve]:
-    """The curve of each of `rows`."""
-    sweep = trace.sweep[row.nearest]
-    order = np.argsort(sweep, kind="stable")
-    names = trace.sweep[[own[0] for own in rows]]
-    first, last = (np.searchsorted(sweep[order], names, side=side) for side in ("left", "right"))
-    # sweeps felt one after another are parts of the arrays as they are
-    as_felt = bool((np.diff(order) == 1).all())
-    places = [slice(start, stop) if as_felt else order[start:stop] for start, stop in zip(first, last, strict=True)]
-    return [SweepCurve.of(row.select(place)) for place in places]
+class _Neighbourhood:
+    """The samples of a thinned trace that lie near others, on whatever sweep."""
 
+    def __init__(self, trace: Trace, outward: FloatArray) -> None:
+        from scipy.spatial import cKDTree
 
-def _fitted(
-    trace: Trace, samples: IntArray, along: FloatArray, outward: FloatArray, neighbours: int = 24
-) -> tuple[FloatArray, FloatArray]:
-    """Tangents across the sweeps, and their doubt, from quadratic fits to the nearest samples of the thinned trace.
+        self._apart = pitch(trace.centers, trace.sweep)
+        kept = thinned(trace.centers, trace.sweep, self._apart)
+        self._cloud, self._sides = trace.centers[kept], outward[kept]
+        self._tree = cKDTree(self._cloud)
 
-    The doubt is three times the residual over the width; it is a right angle where the neighbours lie on one line.
-    Around a sharp edge, or behind a thin wall, the nearest samples are those of another side: they do not count.
-    Samples that lie far closer together than the sweeps have slopes between those of some that are fitted.
-    """
-    from scipy.spatial import cKDTree
+    def fitted(self, centers: FloatArray, along: FloatArray, outward: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Tangents across a sweep (N, 3) at some of its samples, and their doubt, from quadratic fits to the nearest.
 
-    apart = pitch(trace.centers, trace.sweep)
-    kept = thinned(trace.centers, trace.sweep, apart)
-    cloud, sides = trace.centers[kept], outward[kept]
-    tree, count = cKDTree(cloud), min(neighbours, len(cloud))
-    centers = trace.centers[samples]
-    fitted = thinned(centers, trace.sweep[samples], FITTED_APART * apart)
-    frames = _frames(along[samples], outward[samples])
-    slopes, doubt = np.empty(len(fitted)), np.empty(len(fitted))
-    for start in range(0, len(fitted), SAMPLES_AT_ONCE):
-        part = slice(start, start + SAMPLES_AT_ONCE)
-        own = fitted[part]
-        distance, index = (np.asarray(found) for found in tree.query(centers[own], [*range(1, count + 1)]))
-        arm = cloud[index] - centers[own, None]
-        counts = np.einsum("nc,nkc->nk", outward[samples[own]], sides[index]) > TOLD_SIDE
-        slopes[part], doubt[part] = _slopes(arm, distance, counts, *(axis[own] for axis in frames))
-    _, across, up = frames
-    # both ends of every sweep are fitted, so nothing lies between two sweeps
-    s = np.cumsum(np.linalg.norm(np.diff(centers, axis=0, prepend=centers[:1]), axis=1))
-    slope = np.interp(s, s[fitted], slopes)
-    return unit(across + slope[:, None] * up), np.interp(s, s[fitted], doubt)
+        The doubt is three times the residual over the width; it is a right angle where the neighbours lie on one line.
+        Around a sharp edge, or behind a thin wall, the nearest samples are those of another side: they do not count.
+        Samples that lie far closer together than the sweeps have slopes between those of some that are fitted.
+        """
+        count = min(FITTED_NEIGHBOURS, len(self._cloud))
+        fitted = thinned(centers, np.zeros(len(centers), dtype=np.int64), FITTED_APART * self._apart)
+        frames = _frames(along, outward)
+        slopes, doubt = np.empty(len(fitted)), np.empty(len(fitted))
+        for start in range(0, len(fitted), SAMPLES_AT_ONCE):
+            part = slice(start, start + SAMPLES_AT_ONCE)
+            own = fitted[part]
+            distance, index = (np.asarray(found) for found in self._tree.query(centers[own], [*range(1, count + 1)]))
+            arm = self._cloud[index] - centers[own, None]
+            counts = np.einsum("nc,nkc->nk", outward[own], self._sides[index]) > TOLD_SIDE
+            slopes[part], doubt[part] = _slopes(arm, distance, counts, *(axis[own] for axis in frames))
+        _, across, up = frames
+        s = np.cumsum(np.linalg.norm(np.diff(centers, axis=0, prepend=centers[:1]), axis=1))
+        slope = np.interp(s, s[fitted], slopes)
+        return unit(across + slope[:, None] * up), np.interp(s, s[fitted], doubt)
 
 
 def _frames(along: FloatArray, outward: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -197,45 +235,41 @@ def cross_slope(
     points: FloatArray,
     along: FloatArray,
     outward: FloatArray,
-    rows: list[IntArray],
-    curves: list[SweepCurve],
+    before: Iterable[SweepCurve],
+    after: Iterable[SweepCurve],
     least: float = 0.0,
 ) -> CrossSlope:
-    """Slope across the parallel sweeps `rows` at their samples (N, 3) with unit tangents `along` (N, 3).
+    """Slope across a sweep among parallel ones at its samples (N, 3) with unit tangents `along` (N, 3).
 
     The surface is cut at each sample by the plane perpendicular to the sweep, which the neighbouring rows cross
     in a few points; their interpolant gives the slope, its last term the doubt.
 
     Args:
+        before, after: the rows to its sides, the nearest first; no more are asked for than are needed.
         least: rows usually nearer than that, m, to the row itself or to one that was taken already are passed over.
     """
-    tangents = np.empty_like(along)
-    curvature, doubt = np.full((2, len(points)), np.nan)
-    for j, row in enumerate(rows):
-        # row by row: for all samples at once these would be the largest arrays of all
-        across = unit(np.cross(outward[row], along[row]))
-        up = np.cross(along[row], across)
-        up *= np.sign(np.einsum("ij,ij->i", up, outward[row]))[:, None]
-        v, w = np.full((2, len(row), 2 * ROWS_EITHER_SIDE + 1), np.nan)
-        v[:, ROWS_EITHER_SIDE] = w[:, ROWS_EITHER_SIDE] = 0.0
-        for side in (-1, 1):
-            taken, beside = 0, np.zeros(len(row))
-            for other in range(j + side, -1 if side < 0 else len(rows), side):
-                arm = curves[other].crossings(points[row], along[row]) - points[row]
-                away = np.einsum("ij,ij->i", arm, across)
-                if _usual(np.abs(away - beside)) < least:
-                    continue
-                taken, beside = taken + 1, away
-                v[:, ROWS_EITHER_SIDE + side * taken] = away
-                w[:, ROWS_EITHER_SIDE + side * taken] = np.einsum("ij,ij->i", arm, up)
-                if taken == ROWS_EITHER_SIDE:
-                    break
-        slope, bend, told = smooth_slope(v, w)
-        # Beside an outermost sweep nothing shows whether the surface goes on as it came.
-        alone = np.isnan(v[:, ROWS_EITHER_SIDE - 1]) | np.isnan(v[:, ROWS_EITHER_SIDE + 1])
-        doubt[row] = shared(np.where(alone & ~np.isnan(told), np.pi / 2, told))
-        tangents[row], curvature[row] = unit(across + slope[:, None] * up), -bend / (1 + slope**2) ** 1.5
-    return CrossSlope(tangents, curvature, doubt)
+    across = unit(np.cross(outward, along))
+    up = np.cross(along, across)
+    up *= np.sign(np.einsum("ij,ij->i", up, outward))[:, None]
+    v, w = np.full((2, len(points), 2 * ROWS_EITHER_SIDE + 1), np.nan)
+    v[:, ROWS_EITHER_SIDE] = w[:, ROWS_EITHER_SIDE] = 0.0
+    for side, others in ((-1, before), (1, after)):
+        taken, beside = 0, np.zeros(len(points))
+        for other in others:
+            arm = other.crossings(points, along) - points
+            away = np.einsum("ij,ij->i", arm, across)
+            if _usual(np.abs(away - beside)) < least:
+                continue
+            taken, beside = taken + 1, away
+            v[:, ROWS_EITHER_SIDE + side * taken] = away
+            w[:, ROWS_EITHER_SIDE + side * taken] = np.einsum("ij,ij->i", arm, up)
+            if taken == ROWS_EITHER_SIDE:
+                break
+    slope, bend, told = smooth_slope(v, w)
+    # Beside an outermost sweep nothing shows whether the surface goes on as it came.
+    alone = np.isnan(v[:, ROWS_EITHER_SIDE - 1]) | np.isnan(v[:, ROWS_EITHER_SIDE + 1])
+    doubt = shared(np.where(alone & ~np.isnan(told), np.pi / 2, told))
+    return CrossSlope(unit(across + slope[:, None] * up), -bend / (1 + slope**2) ** 1.5, doubt)
 
 
 def _usual(distances: FloatArray) -> float:

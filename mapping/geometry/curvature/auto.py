@@ -31,6 +31,8 @@ TWO_RINGS = 19
 NEAREST_POINTS = 10
 # Standard deviations of the noise beyond which they certainly bend otherwise (one in two million by chance).
 CERTAIN_SDS = 5.0
+# Share of a squared column that may be left of it before the pseudoinverse decides what is rounding: half of its digits
+SINGULAR = 1e-8
 # Jets are in doubt where their interval is wider than this share of all curvatures that the sampling can carry.
 DOUBTFUL_SHARE = 0.1
 # Of several radii the one of the smallest expected error is taken, and of these the vertices where it is smaller than
@@ -102,19 +104,48 @@ def _hidden(points: FloatArray, normals: FloatArray, near: IntArray, mean: Float
         return found
     for part in np.array_split(np.arange(len(points)), max(1, len(points) // LARGE_MESH_POINTS)):
         away = points[near[part, :NEAREST_POINTS]] - points[part, None]
-        n = normals[part, None]
-        up = (away * n).sum(axis=2)
-        flat = away - up[:, :, None] * n
-        scale = np.sqrt((flat**2).sum(axis=(1, 2)) / NEAREST_POINTS)[:, None, None]
-        flat = np.divide(flat, scale, out=np.zeros_like(flat), where=scale > 0)
-        # three columns of the tangential part, of rank two: the least squares of least norm does not mind
-        columns = np.concatenate([np.ones((*flat.shape[:2], 1)), flat, 0.5 * (flat**2).sum(axis=2)[:, :, None]], axis=2)
-        inverse = np.linalg.pinv(columns, rcond=1e-6)[:, -1]
+        n = normals[part]
+        up = np.einsum("mkc,mc->mk", away, n)
+        flat = away - up[:, :, None] * n[:, None]
+        scale = np.sqrt((flat**2).sum(axis=(1, 2)) / NEAREST_POINTS)
+        flat = np.divide(flat, scale[:, None, None], out=np.zeros_like(flat), where=scale[:, None, None] > 0)
+        inverse = _bend_weights(flat, n)
         bent = -(inverse * up).sum(axis=1)
         doubt = noise * np.linalg.norm(inverse, axis=1)
-        size2 = np.where(scale > 0, scale, np.inf)[:, 0, 0] ** 2
+        size2 = np.where(scale > 0, scale, np.inf) ** 2
         found[part] = np.maximum(np.abs(bent / size2 - mean[part]) - CERTAIN_SDS * doubt / size2, 0.0)
     return found
+
+
+def _bend_weights(flat: FloatArray, normals: FloatArray) -> FloatArray:
+    """(M, K) weights of K heights in the bend of the tilted paraboloid of revolution that fits them best.
+
+    What the others leave of the column of half the squared distances tells it alone: a constant and the two
+    directions in the plane are taken off it in closed form, at a sixth of the time that pseudoinverses of all take.
+
+    Args:
+        flat: (M, K, 3) places in the planes with the unit normals (M, 3).
+    """
+    axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(normals, axis)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    x, y = (np.einsum("mkc,mc->mk", flat, way) for way in (first, np.cross(normals, first)))
+    column = 0.5 * (x**2 + y**2)
+    x, y, column = (values - values.mean(axis=1, keepdims=True) for values in (x, y, column))
+    xx, xy, yy, xc, yc = (np.einsum("mk,mk->m", a, b) for a, b in ((x, x), (x, y), (y, y), (x, column), (y, column)))
+    area = xx * yy - xy**2
+    with np.errstate(divide="ignore", invalid="ignore"):  # points on one line, which the pseudoinverse does not mind
+        left = column - ((yy * xc - xy * yc) / area)[:, None] * x - ((xx * yc - xy * xc) / area)[:, None] * y
+        square = np.einsum("mk,mk->m", left, left)
+        weights = left / square[:, None]
+        plain = (area > SINGULAR * (xx + yy) ** 2) & (square > SINGULAR * np.einsum("mk,mk->m", column, column))
+    rest = np.flatnonzero(~plain)
+    if len(rest):
+        # three columns of the tangential part, of rank two: the least squares of least norm does not mind
+        part = flat[rest]
+        columns = np.concatenate([np.ones((*part.shape[:2], 1)), part, 0.5 * (part**2).sum(axis=2)[:, :, None]], axis=2)
+        weights[rest] = np.linalg.pinv(columns, rcond=1e-6)[:, -1]
+    return np.asarray(weights)
 
 
 def _asked(jets: Curvature, reach: FloatArray, points: FloatArray) -> BoolArray:

@@ -203,7 +203,10 @@ class BoxedPoints:
         from mapping.geometry.mesh.box_kernels import POINTS_PER_BOX, boxes_about
 
         self.points, self._order = read_only(points), None
-        steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
+        steps = np.zeros(max(len(points) - 1, 0))
+        for axis in range(3):  # of ten million points all at once would take half a GB for a moment
+            steps += np.square(np.diff(self.points[:, axis]))
+        steps = np.sqrt(steps, out=steps)
         if len(steps) and POINTS_PER_BOX * np.median(steps) > LONGEST_BOX * float(np.ptp(points, axis=0).max()):
             from scipy.spatial import cKDTree
 

@@ -5,6 +5,7 @@ import time
 import numpy as np
 import pytest
 
+from mapping.estimate.envelope import envelope
 from mapping.estimate.envelope.envelope import BRIDGED, EXTRAPOLATED, TOUCHED, EnvelopeError, estimate_surface
 from mapping.geometry.contact.first_contact import BallContact
 from mapping.instrument.noise import Noise
@@ -338,6 +339,35 @@ def test_the_papers_equation_12_alone_fills_a_kink_with_points_inside_other_ball
     naive, exact = estimate_surface(trace, "normals"), estimate_surface(trace)
     assert not (naive.labels == BRIDGED).any()
     assert (exact.labels == BRIDGED).any()
+
+
+@pytest.mark.parametrize("crosswise", [False, True])
+def test_sweeps_laid_out_one_by_one_become_the_same_surface_as_all_at_once(crosswise, monkeypatch):
+    trace = rows(lambda x, y: wire(x + 0.5 * y, r=1.0, height=0.2), pitch=0.2, spacing=0.02)
+    if crosswise:
+        trace = Trace.concatenate([trace, Trace(trace.t, trace.centers[:, [1, 0, 2]], trace.sweep + 1000, 1.0)])
+    above = trace.centers[1000:1050] * [1.0, 1.0, 0.0] + np.array(
+        [0.0, 0.0, 1.6]
+    )  # not one of its contacts is possible
+    trace = Trace.concatenate([trace, Trace(trace.t[:50], above, np.full(50, 5000), 1.0)])
+    at_once = estimate_surface(trace)
+    monkeypatch.setattr(envelope, "CONTACTS_AT_ONCE", 1)
+    one_by_one = estimate_surface(trace)
+    assert at_once.surface is not None and one_by_one.surface is not None
+    np.testing.assert_array_equal(one_by_one.surface.vertices, at_once.surface.vertices)
+    np.testing.assert_array_equal(one_by_one.surface.faces, at_once.surface.faces)
+    np.testing.assert_array_equal(one_by_one.labels, at_once.labels)
+    np.testing.assert_array_equal(one_by_one.sample, at_once.sample)
+    assert not (one_by_one.sweep == 5000).any()
+
+
+def test_of_too_many_points_there_remain_as_many_as_anybody_sees(monkeypatch):
+    trace = rows(sphere, pitch=0.2, spacing=0.02)
+    every = estimate_surface(trace)
+    monkeypatch.setattr(envelope, "MOST_POINTS", len(every.points) // 2)
+    fewer = estimate_surface(trace)
+    assert 0.3 * len(every.points) < len(fewer.points) < 0.6 * len(every.points)
+    assert {tuple(point) for point in fewer.points} <= {tuple(point) for point in every.points}
 
 
 def test_smoothing_by_the_noise_removes_the_bias_of_the_envelope():
