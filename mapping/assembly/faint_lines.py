@@ -259,6 +259,8 @@ def _polished(line: FaintLine, inspection: Inspection, free: BoolArray, inflatio
             power = np.maximum(square[None] - square[:, None], LEAST_POWER)
             match = np.triu(signal[None] - signal[:, None], LINE_LENGTHS[0]) / np.sqrt(power)
             first, last = np.unravel_index(match.argmax(), match.shape)
+            if match[first, last] <= 0.0:  # all that lies there speaks against a line of this sign, or nothing does
+                continue
             touched = np.flatnonzero(sums[1][first:last] > 0)
             first, last = first + touched[0], first + touched[-1] + 1
             height = float(match[first, last] / np.sqrt(power[first, last]))

@@ -186,9 +186,9 @@ class Explore:
             found.left_out.append("circuits, ridge following and sizing: the survey found nothing")
             return Outcome("nothing found")
         sense = Sense(self.base, found.noise, self.false_alarms_per_metre)
-        while actions := self._actions(found, sense):
+        while actions := self._actions(surveyor, found, sense):
             best = max(actions, key=lambda action: action.gain / action.seconds)
-            outcome = yield from best.start()
+            outcome = yield from surveyor.watched(best.start())
             found.actions.append(f"{best.name}: {outcome.reason}" + (f" ({outcome.detail})" if outcome.detail else ""))
         return Outcome("done")
 
@@ -217,12 +217,12 @@ class Explore:
         found.tracks.extend([] if followed.value is None else [followed.value])
         return Outcome(f"by up to {lead.passes} passes", followed.detail)
 
-    def _actions(self, found: Found, sense: Sense) -> list[Action]:
+    def _actions(self, surveyor: Surveyor, found: Found, sense: Sense) -> list[Action]:
         actions = []
         for seed in found.unexplained()[:1]:
             pitch = self.survey.pitch
             seconds = 2.0 * np.pi * self._circuit_radius(seed) / self.speed
-            actions.append(Action("look into", pitch, seconds, partial(self._look_into, seed, found, sense)))
+            actions.append(Action("look into", pitch, seconds, partial(self._look_into, seed, surveyor, found, sense)))
         for lead in [] if actions else found.leads[:1]:
             # what single sweeps show comes first: it may be what the faint line is a part of
             seconds = lead.passes * lead.length / self.speed
@@ -250,8 +250,12 @@ class Explore:
         half_width = seed.half_width * min(1.0, 1.3 * slender(seed, self.tip_radius))
         return 1.4 * half_width + 0.5 * self.survey.pitch
 
-    def _look_into(self, seed: Crossing, found: Found, sense: Sense) -> Plan:
-        """Circle a detection, then follow the ridge or size the bump that it belongs to."""
+    def _look_into(self, seed: Crossing, surveyor: Surveyor, found: Found, sense: Sense) -> Plan:
+        """Circle a detection, then follow the ridge or size the bump that it belongs to.
+
+        But not where the circuit shows that the body differs from its model: on such a part, or at its rim, from which
+        all branches lead onto it.
+        """
         found.tried.append(seed)
         edge = found.step_heading(seed, 3.0 * self.survey.pitch)
         if edge is not None:
@@ -260,6 +264,12 @@ class Explore:
             return Outcome("step", followed.detail)
         circled = yield from Circuit(self.strokes, sense, self._circuit_radius(seed)).around(seed)
         branches: tuple[Crossing, ...] = circled.value
+        if surveyor.may_be_part(seed):
+            surveyor.look_for_parts()
+            beside = surveyor.off_parts(branches)
+            if not surveyor.off_parts((seed,)) or (branches and not beside):
+                return Outcome("part", "the body differs from its model there")
+            branches = beside
         if branches:
             seed, ways = _typed(seed, branches), headings(seed, branches, self.tip_radius)
         else:

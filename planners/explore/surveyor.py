@@ -11,8 +11,8 @@ import numpy as np
 from hw import Move
 from mapping import FloatArray, Trace, length_text
 from mapping.base import LaidTrace
-from mapping.detection import Coverage, detect, expected_limit
-from mapping.estimate.deviation import Deviation, explain, lay_out
+from mapping.detection import Coverage, Crossing, detect, expected_limit
+from mapping.estimate.deviation import WIDE_PART, Deviation, Part, explain, lay_out
 from mapping.instrument import Noise, StatedNoise
 from planners import Outcome, Plan, executed
 from planners.explore.found import Found
@@ -69,10 +69,11 @@ class Surveyor:
         given_noise: that was known before the survey; None: none.
         visible: share of the smallest feature's height that stays visible between two sweeps.
         paths: touched by the sweeps so far, each (K, 3), m.
-        felt: by each sweep that felt anything.
+        felt: by each sweep that felt anything, those of later looks included.
         commanded: paths of the ball's centre (K, 3) that were carried out, m.
         limit: least height that the sweeps detect one by one, m.
         metres: length of all lines that are laid out, m.
+        parts: where the body differs from its model alone, by what was felt: nothing is looked for there.
         count: kept up as it goes.
     """
 
@@ -89,6 +90,7 @@ class Surveyor:
     commanded: list[FloatArray] = field(init=False, default_factory=list)
     limit: float = field(init=False, default=0.0)
     metres: float = field(init=False, default=0.0)
+    parts: tuple[Part, ...] = field(init=False, default=())
 
     def __post_init__(self) -> None:
         self.visible = self.survey.visible if self.expected is None else self._visible_for(self.expected)
@@ -148,6 +150,7 @@ class Surveyor:
         """What was found on a wrong model is forgotten, and looked for on the corrected one; not where parts differ."""
         laid = LaidTrace(Trace.concatenate(self.felt), deviation.base)
         laid = LaidTrace.of(deviation.without_drift(laid), deviation.base)
+        self.parts = deviation.parts
         if deviation.parts:
             laid = laid.within(deviation.outside(laid.feet().points))
         self.survey = replace(self.survey, base=deviation.base)
@@ -155,6 +158,36 @@ class Surveyor:
         self.found.noise = self.given_noise
         self.found.unseen.clear()
         self._detect([laid])
+
+    def watched(self, plan: Plan) -> Plan:
+        """A plan that goes on from the survey; what it feels is kept, too."""
+        answer: Trace | None = None
+        while True:
+            try:
+                move = next(plan) if answer is None else plan.send(answer)
+            except StopIteration as end:
+                outcome: Outcome = end.value
+                return outcome
+            answer = yield move
+            self._keep(executed(move, answer), answer)
+
+    def may_be_part(self, seed: Crossing) -> bool:
+        """True if what was detected may belong to a part: one is known, or it is as wide as the least of them."""
+        return bool(self.parts) or 2.0 * seed.half_width >= WIDE_PART * self.survey.tip_radius
+
+    def look_for_parts(self) -> None:
+        """Find the parts by all that was felt since, too, and forget what was detected on them.
+
+        A survey may cross one once, as it would a groove, or its rim alone; what goes round it tells.
+        """
+        base = self.survey.base
+        deviation = explain(LaidTrace.together(self.felt, base), base, self.commanded)
+        self.parts = () if deviation is None else deviation.parts
+        self.found.crossings[:] = self.off_parts(self.found.crossings)
+
+    def off_parts(self, crossings: Sequence[Crossing]) -> tuple[Crossing, ...]:
+        """Those that lie on no part."""
+        return tuple(c for c in crossings if not any(part.covers(c.point[None])[0] for part in self.parts))
 
     def covered(self) -> Coverage:
         """How much of the surface lies near enough to a sweep to see the smallest feature."""

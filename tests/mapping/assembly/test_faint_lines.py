@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from mapping import Feature, Interval, Support
 from mapping.assembly.faint_features import _is_weak
-from mapping.assembly.faint_lines import faint_lines, threshold
+from mapping.assembly.faint_lines import _polished, faint_lines, threshold
 from mapping.assembly.linking.inspection import Inspection, inspect
 from mapping.base.base import Base
 from mapping.geometry.mesh.polyline import distances
@@ -152,3 +153,13 @@ def test_what_is_not_known_of_the_noise_raises_what_a_line_needs():
     assert line.snr > 1.1 * needed
     assert len(faint_lines(inspection, normals, nothing, WIDTH, 1.0, 0.01, 1.1)) == 1
     assert faint_lines(inspection, normals, nothing, WIDTH, 1.0, 0.01, 1.01 * line.snr / needed) == ()
+
+
+@pytest.mark.parametrize("free", [0.0, 1.0])
+def test_a_line_that_nothing_about_it_speaks_for_stays_as_it_is(free):
+    inspection = places(3 * SD, 0)
+    line = found(inspection)[0]
+    against = replace(inspection, height=-np.abs(inspection.height))
+    kept = _polished(line, against, np.full(len(inspection.points), bool(free)), 1.0)
+    np.testing.assert_array_equal(kept.axis, line.axis)
+    assert kept.snr == line.snr

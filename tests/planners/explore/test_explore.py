@@ -148,6 +148,21 @@ def test_a_ball_is_a_bump_at_its_place() -> None:
     assert found.bumps[0].height == pytest.approx(0.001, rel=0.05)
 
 
+def test_a_wide_dent_that_the_survey_crossed_once_is_told_by_what_goes_round_it() -> None:
+    x, y = (np.linspace(0.0, side, round(side / 2e-3) + 1) for side in (0.08, 0.06))
+    places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    share = np.clip(np.linalg.norm(places - [0.04, 0.02], axis=1) / 0.018, 0.0, 1.0)
+    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(len(x) - 1), np.arange(len(y) - 1), indexing="ij"))
+    a = i * len(y) + j
+    b = a + len(y)
+    faces = np.concatenate([np.column_stack([a, b, b + 1]), np.column_stack([a, b + 1, a + 1])])
+    body = Surface(np.column_stack([places, -1e-3 * (1.0 + np.cos(np.pi * share))]), faces)
+    found, finger, _ = explore(body, shortest_ridge=0.025)
+    assert not found.tracks and not found.bumps
+    assert found.actions == ["look into: part (the body differs from its model there)"]
+    assert finger.clock < 25.0
+
+
 def test_nothing_is_found_on_a_bare_plate_and_nothing_but_the_survey_is_done() -> None:
     found, finger, outcome = explore(PLATE)
     assert outcome.reason == "nothing found"
