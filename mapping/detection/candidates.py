@@ -183,7 +183,9 @@ def _stretches(
     """(heights, first bin, past-last bin, crest, signal-to-noise) of each stretch.
 
     Each round takes the candidates that nothing stronger overlaps, removes those stretches from the profile that
-    are strong enough to hide others, and looks again, until nothing new exceeds the threshold.
+    are strong enough to hide others, and looks again, until nothing new exceeds the threshold. A filter sees more than
+    its own width: what it no longer sees when the stronger ones of its round are removed was their far lobe. One took
+    a crest 0.43 mm high under a noise of 10 um for a bump 15 mm away, with a signal-to-noise ratio of 216.
     """
     height = profile.height.copy()
     certainty = _certainties(profile, bank, null)
@@ -195,7 +197,9 @@ def _stretches(
         accepted, changed = _dominant(candidates, weak), False
         if not accepted:
             return
-        for place, half_width, crest, snr in accepted:
+        for place, half_width, crest, snr, k in accepted:
+            if changed and snr * bank.seen(height, place, k) / crest < threshold:
+                continue
             begin, end = _extent(height, place, half_width, crest, profile, noise, tip_radius)
             yield height.copy(), begin, end, crest, snr
             if snr < HIDING * threshold:
@@ -243,25 +247,26 @@ def _certainty(scarcity: FloatArray, bins: int) -> FloatArray | None:
 
 def _candidates(
     height: FloatArray, bank: Bank, threshold: float, tip_radius: float, certainty: FloatArray | None
-) -> list[tuple[float, int, float, float]]:
-    """(signal-to-noise, bin, half-width in bins, height) of local maxima over place for every width."""
+) -> list[tuple[float, int, float, float, int]]:
+    """(signal-to-noise, bin, half-width in bins, height, filter) of local maxima over place for every width."""
     sharpest = PHYSICAL / (2 * tip_radius)
     found = bank.peaks(height, _longest(height, bank), threshold, sharpest, certainty).tolist()
-    return [(snr, int(place), bank.filters[int(k)].half_width / bank.spacing, crest) for snr, place, k, crest in found]
+    widths = (bank.widths / bank.spacing).tolist()
+    return [(snr, int(place), widths[int(k)], crest, int(k)) for snr, place, k, crest in found]
 
 
 def _dominant(
-    candidates: list[tuple[float, int, float, float]], taken: list[tuple[int, float]]
-) -> list[tuple[int, float, float, float]]:
-    """Place, half-width, height and signal-to-noise of the candidates, the strongest first.
+    candidates: list[tuple[float, int, float, float, int]], taken: list[tuple[int, float]]
+) -> list[tuple[int, float, float, float, int]]:
+    """Place, half-width, height, signal-to-noise and filter of the candidates, the strongest first.
 
     Candidates that overlap a stronger one or one of those taken already (place, half-width) are left out.
     """
-    kept: list[tuple[int, float, float, float]] = []
+    kept: list[tuple[int, float, float, float, int]] = []
     blocked = list(taken)
-    for snr, place, half_width, crest in sorted(candidates, reverse=True):
+    for snr, place, half_width, crest, k in sorted(candidates, reverse=True):
         if all(abs(place - other) >= half_width + width for other, width in blocked):
-            kept.append((place, half_width, crest, snr))
+            kept.append((place, half_width, crest, snr, k))
         blocked.append((place, half_width))
     return kept
 

@@ -88,6 +88,16 @@ class Bank:
         highest = sharpest * self.widths**2
         return np.asarray(peaks(profile, self._in_a_row[0][:count], *self._in_a_row[1:], threshold, highest, known))
 
+    def seen(self, profile: FloatArray, place: int, k: int) -> float:
+        """The largest height (m) of either sign that filter k estimates within two of its bins of a place of a profile
+        (n,); the profile's ends are seen as ends only where the filter reaches them."""
+        each = self.filters[k]
+        centre, reach, count = place // each.coarse, len(each.edge) + 2, len(profile) // each.coarse
+        low, high = max(0, centre - reach), min(count, centre + reach + 1)
+        heights, _ = each.heights(self.levelled(profile)[low * each.coarse : high * each.coarse])
+        near = heights[max(0, centre - low - 2) : centre - low + 3]
+        return float(near[np.argmax(np.abs(near))])
+
     def levelled(self, profile: FloatArray) -> FloatArray:
         """Heights (n,) without what of the base no filter may see, by least squares.
 

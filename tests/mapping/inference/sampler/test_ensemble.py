@@ -80,20 +80,6 @@ def test_importance_sampling_finds_moments_and_evidence_from_a_poor_start():
     assert fast.log_evidence == pytest.approx(np.log(2 * np.pi * 5.0), abs=0.05)
 
 
-def test_a_density_is_given_up_as_soon_as_it_is_surely_too_light_and_never_else():
-    target, modes = Gaussian(np.array([1.0, 5.0])), [Laplace(np.array([1.0, -3.0]), np.diag([4.0, 1.0]), 0.0)]
-    evidence = np.log(2 * np.pi * 5.0)
-
-    def sampled(seed, least):
-        return importance_sample(target, modes, np.random.default_rng(seed), least)
-
-    for seed in range(50):
-        np.testing.assert_array_equal(sampled(seed, evidence - 0.1).draws, sampled(seed, -np.inf).draws)
-        early = sampled(seed, evidence + 3.0)
-        assert len(early.draws) < len(sampled(seed, -np.inf).draws) and early.k_hat < 0.5
-        assert early.log_evidence == pytest.approx(evidence, abs=1.0)
-
-
 def test_two_modes_get_their_shares():
     modes = [Laplace(np.zeros(2), np.eye(2), 0.0), Laplace(np.full(2, 12.0), 0.25 * np.eye(2), 0.0)]
     rng = np.random.default_rng(2)
