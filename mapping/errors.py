@@ -45,7 +45,11 @@ class EnvelopeError(MappingError):
 
 
 class EmptyWindowError(MappingError):
-    """No sample of the trace is near the feature, or its axis does not lie over the base, or turns back on itself."""
+    """No sample of the trace is near the feature."""
+
+
+class CourseError(EmptyWindowError):
+    """The axis does not lie over the base, or turns back on itself: the feature cannot be asked whether it is there."""
 
 
 class CurvatureError(MappingError):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import EmptyWindowError, Feature, FloatArray, Posterior, Trace
+from mapping import CourseError, EmptyWindowError, Feature, FloatArray, Posterior, Trace
 from mapping.base import Base, fit_base
 from mapping.inference.evidence import (
     ROUGH_EVIDENCE,
@@ -121,8 +121,8 @@ def refine(
     """The feature with posterior, intervals and axis from the draws; arguments as for `sample_posterior`, and what
     makes draws of such that hold the others: None, these are known.
 
-    Kinds without a closed form (edges) come back as they are, with a note; so does, with no
-    evidence, a feature without any sample near it.
+    Kinds without a closed form (edges) come back as they are, with a note; so do a line whose course does not lie over
+    the base and, with no evidence, a feature without any sample near it.
     """
     if not kind_of(feature).sampled:
         note = f"no posterior: a {feature.kind} has no closed-form trace"
@@ -131,6 +131,10 @@ def refine(
     noise = noise or noise_of_trace(trace, base)
     try:
         solution = solve(feature, trace, rng, base=base, noise=noise, others=others, tip_sd=tip_sd, confirm=confirm)
+    except CourseError as error:  # nothing was asked of the trace: what single sweeps showed of it stands
+        remark = f"its sizes are those that single sweeps show, for {error}"
+        details = replace(feature.details, misfit=remark)
+        return replace(feature, details=details, notes=(*feature.notes, f"no posterior: {error}"))
     except EmptyWindowError as error:  # one feature without a sample must not cost all others
         nothing = replace(feature.evidence, log_odds=0.0)
         return replace(feature, evidence=nothing, notes=(*feature.notes, f"no posterior: {error}"))

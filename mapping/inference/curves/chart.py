@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import EmptyWindowError, FloatArray, IntArray
+from mapping import CourseError, FloatArray, IntArray
 from mapping.base import Base, between_walls, onto_base
 from mapping.inference.curves.body_edge import Wall, up_to_edges
 
@@ -119,7 +119,7 @@ def chart_along(
         bends: False for a trial of the course alone: the base is not asked how it bends across, and taken for flat.
 
     Raises:
-        EmptyWindowError: the line does not lie over the base, turns back on itself, or has no length.
+        CourseError: the line does not lie over the base, turns back on itself, or has no length.
     """
     closed = len(axis) > 3 and bool(np.array_equal(axis[0], axis[-1]))
     line, lift = _resampled(axis, normals, spacing)
@@ -157,7 +157,7 @@ def _resampled(axis: FloatArray, normals: FloatArray, spacing: float) -> tuple[F
     keep = np.concatenate([[True], np.diff(s) > 0.0])
     s, axis, normals = s[keep], axis[keep], normals[keep]
     if len(s) < 2:
-        raise EmptyWindowError("all points of its axis are one")
+        raise CourseError("all points of its axis are one")
     even = np.linspace(0.0, s[-1], max(2, int(np.ceil(s[-1] / spacing)) + 1))
     both = [np.column_stack([np.interp(even, s, values[:, i]) for i in range(3)]) for values in (axis, normals)]
     return both[0], both[1] / np.linalg.norm(both[1], axis=1, keepdims=True)
@@ -193,7 +193,7 @@ def _apart(points: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray]:
     step = np.linalg.norm(np.diff(points, axis=0), axis=1)
     apart = np.concatenate([[True], step > 1e-9 * step.max(initial=0.0)])
     if apart.sum() < 2:
-        raise EmptyWindowError("its axis does not lie over the base")
+        raise CourseError("its axis does not lie over the base")
     return points[apart], up[apart]
 
 
@@ -206,7 +206,7 @@ def _tangents(points: FloatArray, closed: bool) -> FloatArray:
         along = np.gradient(points, axis=0)
     length = np.linalg.norm(along, axis=1, keepdims=True)
     if length.min() <= 1e-9 * length.max():
-        raise EmptyWindowError("its axis turns back on itself")
+        raise CourseError("its axis turns back on itself")
     return np.asarray(along / length)
 
 

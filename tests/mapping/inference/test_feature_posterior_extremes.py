@@ -129,3 +129,15 @@ def test_a_feature_without_a_sample_near_by_has_no_evidence_and_costs_no_other()
     found = refine(far, trace, np.random.default_rng(0), base=plate(), noise=WHITE)
     assert found.posterior is None and not found.evidence.likely
     assert "no sample of the trace" in found.notes[-1]
+
+
+def test_a_line_whose_course_leaves_the_base_is_kept_with_what_single_sweeps_showed():
+    """A bump of 14 crossings, told as a line whose chord leaves the body, was dropped as a false alarm."""
+    trace = record(CROSSINGS, wire(ENDS))
+    off = feature("ridge", [(0.4, 0.4, 0), (0.42, 0.4, 0)], D, D)
+    found = refine(off, trace, np.random.default_rng(0), base=plate(), noise=WHITE)
+    assert found.posterior is None and found.evidence == off.evidence and found.evidence.likely
+    assert found.notes[-1] == "no posterior: its axis does not lie over the base"
+    assert (
+        found.details.misfit == "its sizes are those that single sweeps show, for its axis does not lie over the base"
+    )
