@@ -94,7 +94,7 @@ class Bank:
         each = self.filters[k]
         centre, reach, count = place // each.coarse, len(each.edge) + 2, len(profile) // each.coarse
         low, high = max(0, centre - reach), min(count, centre + reach + 1)
-        heights, _ = each.heights(self.levelled(profile)[low * each.coarse : high * each.coarse])
+        heights, _ = each.heights(self.levelled(profile[low * each.coarse : high * each.coarse]))
         near = heights[max(0, centre - low - 2) : centre - low + 3]
         return float(near[np.argmax(np.abs(near))])
 
