@@ -73,16 +73,21 @@ def test_a_refused_move_forbids_none_of_those_after_it() -> None:
     assert [move.purpose for move in made] == ["sweep", "travel", "sweep", "travel", "sweep"]
 
 
-def test_a_sweep_that_the_finger_could_not_leave_ends_where_it_can() -> None:
+def over_a_floor(size: tuple[float, float, float], at: tuple[float, float, float]) -> Surface:
+    """A plate of 60 mm with its top at 0, and a box about a place, mm."""
     from trimesh.creation import box
 
-    # under the ceiling there is room for the stem, but none to draw back by half a radius
-    floor, ceiling = box(extents=(60, 60, 4)), box(extents=(30, 60, 4))
+    floor, other = box(extents=(60, 60, 4)), box(extents=size)
     floor.apply_translation([0, 0, -2])
-    ceiling.apply_translation([15, 0, 25.2])
-    body = Surface(
-        1e-3 * np.concatenate([floor.vertices, ceiling.vertices]), np.concatenate([floor.faces, ceiling.faces + 8])
+    other.apply_translation(at)
+    return Surface(
+        1e-3 * np.concatenate([floor.vertices, other.vertices]), np.concatenate([floor.faces, other.faces + 8])
     )
+
+
+def test_a_sweep_that_the_finger_could_not_leave_ends_where_it_can() -> None:
+    # under the ceiling there is room for the stem, but none to draw back by half a radius
+    body = over_a_floor((30, 60, 4), (15, 0, 25.2))
     base, touch = Base(body), SimulatedFinger(object=body, tip_radius=R, rate=500.0)
     limits, carrier = Limits.of(touch.workspace, base, R), Carrier.of(base, R)
     under = sweep([-20, 0, 2.94], [20, 0, 2.94], np.array([0.0, 0.0, -1.0]))
@@ -105,15 +110,8 @@ def test_a_sweep_that_the_finger_could_not_leave_ends_where_it_can() -> None:
 
 
 def test_a_sweep_ends_where_the_ball_keeps_off_what_it_is_drawn_back_towards() -> None:
-    from trimesh.creation import box
-
     # a beam beside the stem: drawn back along the floor's normal the ball comes as near to it as 0.05 radii
-    floor, beam = box(extents=(60, 60, 4)), box(extents=(2, 60, 2))
-    floor.apply_translation([0, 0, -2])
-    beam.apply_translation([3.3, 0, 7.65])
-    body = Surface(
-        1e-3 * np.concatenate([floor.vertices, beam.vertices]), np.concatenate([floor.faces, beam.faces + 8])
-    )
+    body = over_a_floor((2, 60, 2), (3.3, 0, 7.65))
     base, carrier = Base(body), Carrier.of(Base(body), R)
     along = sweep([0, -10, 2.94], [0, 10, 2.94], np.array([0.0, 0.0, -1.0]))
     assert can_be_left(along, carrier)
