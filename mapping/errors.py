@@ -49,7 +49,7 @@ class EmptyWindowError(MappingError):
 
 
 class CourseError(EmptyWindowError):
-    """The axis does not lie over the base, or turns back on itself: the feature cannot be asked whether it is there."""
+    """The axis does not lie over the base, turns back on itself or has no length: the trace cannot be asked about it."""
 
 
 class CurvatureError(MappingError):

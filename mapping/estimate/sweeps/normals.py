@@ -19,8 +19,10 @@ from mapping.estimate.sweeps.rows import parallel_rows, pitch, thinned
 from mapping.estimate.sweeps.tangents import lagrange, unit
 from mapping.geometry.curvature import TOLD_SIDE
 
-# Samples whose neighbourhoods are fitted together: a bound on the memory that they take
-SAMPLES_AT_ONCE, FITTED_NEIGHBOURS = 4096, 24
+# Samples in a neighbourhood: four for each of the six terms of the quadratic that is fitted to it
+FITTED_NEIGHBOURS = 24
+# Samples whose neighbourhoods are fitted together: their arms are 4096 * 24 vectors, 2.4 MB
+SAMPLES_AT_ONCE = 4096
 # Sweeps whose curves are held: those that a slope is taken across are nine, and more where passes over one line lie
 # between them
 CURVES_HELD = 32
