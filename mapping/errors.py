@@ -49,7 +49,7 @@ class EmptyWindowError(MappingError):
 
 
 class CourseError(EmptyWindowError):
-    """The axis does not lie over the base, turns back on itself or has no length: the trace cannot be asked about it."""
+    """The axis does not lie over the base, turns back on itself or has no length: no trace tells of it."""
 
 
 class CurvatureError(MappingError):
