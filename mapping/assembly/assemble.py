@@ -12,7 +12,7 @@ from mapping.assembly.details import details_of, made_of
 from mapping.assembly.edges import edge_features, step_features
 from mapping.assembly.faint_features import faint_spacing, why_none_sought, with_faint_lines
 from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
-from mapping.assembly.free import free_sections, free_spot
+from mapping.assembly.free import free_sections, free_spot, outweighed
 from mapping.assembly.free_lines import free_lines, lies_on
 from mapping.assembly.lines import Around
 from mapping.assembly.linking import Inspection, Inspections, groups
@@ -82,10 +82,15 @@ def assemble(
         wide, slanted = free_lines(sections, detections, laid)
         fine = [*rest, *upon, *(crossing for section in slanted for crossing in section.inside)]
         crossings = tuple(c for c in fine if not any(lies_on(c, feature) for feature in wide))
+        if wide and spacing is not None:
+            looked = inspections.at(spacing)
+            beside = _linked(replace(detections, crossings=crossings), laid, looked)
+            lost = outweighed([*wide, *beside], _linked(detections, laid, looked), looked, laid.tip_radius)[: len(wide)]
+            if any(lost):
+                wide = [feature for feature, out in zip(wide, lost, strict=True) if not out]
+                crossings = tuple(c for c in detections.crossings if not any(lies_on(c, feature) for feature in wide))
         detections = replace(detections, crossings=crossings)
-    features = (
-        [*flat, *_linked(detections, laid, inspections.at(spacing))] if spacing is not None and crossings else flat
-    )
+    features = flat if spacing is None else [*flat, *_linked(detections, laid, inspections.at(spacing))]
     if features and spacing is not None and proposals:
         places = _places(inspections.at(spacing))
         around = Surroundings(laid, base, detections.noise.rounded(laid.resolution))
@@ -133,6 +138,8 @@ def place_spacing(crossings: Sequence[Crossing], tip_radius: float) -> float:
 
 def _linked(detections: Detections, trace: LaidTrace, inspection: Inspection) -> list[Feature]:
     """Features of the crossings that single sweeps detected."""
+    if not detections.crossings:
+        return []
     tip, scale, base = trace.tip_radius, _scale(detections.crossings, trace.tip_radius), trace.base
     around = Around(inspection, base, detections, tip)
     edges, crossings = edge_features(detections.crossings, around)

@@ -12,12 +12,14 @@ if TYPE_CHECKING:
     )
     from mapping.assembly.free.mean_section import mean_sizes as mean_sizes
     from mapping.assembly.free.outline import WIDER_THAN_CREST as WIDER_THAN_CREST
+    from mapping.assembly.free.rival_courses import outweighed as outweighed
     from mapping.assembly.free.section import CORE as CORE
 
 _PUBLIC = {
     "free_sections": ("FreeSection", "free_sections", "free_spot"),
     "mean_section": ("mean_sizes",),
     "outline": ("WIDER_THAN_CREST",),
+    "rival_courses": ("outweighed",),
     "section": ("CORE",),
 }
 doorway(__name__, _PUBLIC)

@@ -189,9 +189,9 @@ def _improved(
     found = searched(start, parts, np.array(points).reshape(-1, 3), proposals)
     odds = _told(found)
     noted = (ENDED_EARLY,) if found.bounded else ()
-    # a section or a course alone is the posterior's to choose, and what explains the trace only in part adds nothing
+    # a section or a course alone is the posterior's to choose
     adds = len(found.best.kinds) > len(found.start.kinds)
-    if (adds and not found.best.fits) or (
+    if (adds and not found.best.fits and not _pays_beside_misfit(found)) or (
         set(found.accepted) <= CHOSEN_LATER and found.best.kinds == found.start.kinds
     ):
         felt = [_felt_by_runs(feature, found.start.runs(k)) for k, feature in enumerate(group)]
@@ -199,6 +199,18 @@ def _improved(
     algorithms = group[0].evidence.algorithms if group else ()
     features = [_with_odds(feature, odds, noted) for feature in _described(found.best, around, algorithms)]
     return _meeting(features, around.trace.tip_radius), found.best
+
+
+def _pays_beside_misfit(found: Account) -> bool:
+    """True if what was added to a configuration that does not fit either way pays for itself as if what is left over
+    were noise: of an unknown level, and one number for each half-width of path, over which a shape is wrong as a whole
+    (Schwarz, Annals of Statistics 6, 1978)."""
+    best, start = found.best, found.start
+    looks = float(2.0 * best.place.window.half.sum()) / best.place.half_width
+    left, before = (float(white @ white) for white in (each.white_residual for each in (best, start)))
+    more = len(best.found.mean) - len(start.found.mean)
+    prior = best.log_prior - start.log_prior
+    return 0.5 * looks * float(np.log(before / left)) - 0.5 * more * float(np.log(looks)) + prior > 0.0
 
 
 def _explains(best: Configuration, spot: Feature) -> bool:

@@ -136,10 +136,20 @@ class Configuration:
     @property
     def fits(self) -> bool:
         """True if what it leaves over is no more than noise, the least misfit, and what all crossings show alike."""
-        white = self.place.levels[0][0].residuals(self.template[None])[0]
+        white = self.white_residual
         return (float(white @ white) - self.deviation.explained - len(white)) / float(
             np.sqrt(2.0 * len(white))
         ) < FITTING_EXCESS
+
+    @cached_property
+    def white_residual(self) -> FloatArray:
+        """What it leaves over, in standard deviations of the noise and the least misfit."""
+        return np.asarray(self.place.levels[0][0].residuals(self.template[None])[0])
+
+    @property
+    def log_prior(self) -> float:
+        """Log odds of its details before the data."""
+        return sum(_log_prior(part, self.place) for part in self.parts)
 
     @cached_property
     def as_narrow_as_wires(self) -> list[bool]:

@@ -69,7 +69,7 @@ PEAK_SDS = 4.0
 THINNER = 1.0
 # Degrees that a line's course is asked to have instead of a higher one. Each is half of the next, up to the highest: a
 # line keeps at most twice the bends that it needs, and more odds are asked for only where the data pay for them
-LOWER_DEGREES = (1, 2, 4)
+LOWER_DEGREES = (1, 2, 4, 8)
 # Most points that straight lines are drawn through: two by two, which is the square of that
 MOST_DRAWN_THROUGH = 60
 

@@ -6,7 +6,13 @@ import numpy as np
 
 from mapping import FloatArray
 
-HIGHEST_DEGREE = 8
+# Two half circles that meet in an S lie off their best polynomials by 4.7 % of their radius at degree 8, by 0.9 % at
+# 16; a course takes a degree only where it pays for itself
+HIGHEST_DEGREE = 16
+# Through N places at even distances a polynomial of a degree beyond 2 sqrt(N) swings between them and flies off at the
+# ends (Dahlquist and Bjorck, Numerical Methods, 1974). Of few places that allows less than what was
+# always tried there: 8
+STABLE_SHARE, ALWAYS_TRIED = 2.0, 8
 # A fit whose typical square residual exceeds this many variances follows the axis at no degree: the axis is kept.
 POOR = 9.0
 # Degrees of freedom of the residuals' tails, and the median of chi-square with two.
@@ -29,6 +35,7 @@ def smooth_axis(axis: FloatArray, sd: float, most: int = HIGHEST_DEGREE, least: 
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(axis, axis=0), axis=1))])
     points = len(axis) - 1 if closed else len(axis)
     most = min((points - 2) // 2 if closed else points - 2, most)
+    most = min(most, max(ALWAYS_TRIED, int(STABLE_SHARE * np.sqrt(points))))
     lowest = min(least, most)
     if most < 1:
         return axis, 1

@@ -36,7 +36,6 @@ from mapping.inference.sampler import find_optima
 # Chords of the chart may sag by this share of the feature's height.
 SAG = 0.005
 MOST_LEGS = 300
-HIGHEST_MODE = 8
 # An end may lie so many half-widths beyond an edge of the body, where all places say the same: the line is open there.
 # One that was felt to go on to as near to an edge as the ball feels it is open as likely as not
 OPEN = 1.0
@@ -280,10 +279,10 @@ def _modes(chart: Chart, ends: FloatArray, degree: int, spare: int, crossings: i
     if chart.closed:
         # Offsets of a ring whose coordinates have a degree have harmonics one higher: an ellipse differs from a
         # circle by the second.
-        highest = max(0, min(degree + 1, (crossings - 1) // 2, HIGHEST_MODE))
+        highest = max(0, min(degree + 1, (crossings - 1) // 2, HIGHEST_DEGREE))
         return CurveModes(highest, 0.5 * chart.length, 0.5 * chart.length, True)
     reach = max(0.5 * abs(float(ends[1] - ends[0])), 0.5 * sizes.half_width)
-    highest = min(max(degree, 1) + spare, max(crossings - 1, 1), HIGHEST_MODE)
+    highest = min(max(degree, 1) + spare, max(crossings - 1, 1), HIGHEST_DEGREE)
     return CurveModes(highest, float(ends.mean()), reach, False)
 
 

@@ -1,0 +1,52 @@
+"""Rows that run along a fine line at a slant show it as wide as they like: the rows that cross it say what it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mapping import FloatArray, Trace
+from mapping.assembly import assemble
+from mapping.base import fit_base
+from mapping.detection import detect
+
+TIP, WIRE, NOISE, HALF = 10e-3, 0.65e-3, 60e-6, 16e-3
+
+
+def felt(axes: list[FloatArray]) -> Trace:
+    """Rows and columns over round wires on a plate: the ball's centre stays r + a off their axes (exact)."""
+    run, places = np.arange(-HALF, HALF, 50e-6), np.arange(-HALF + 0.7e-3, HALF, 2e-3)
+    rows = [np.column_stack([run, np.full(len(run), place)]) for place in places]
+    feet = np.concatenate([*rows, *(row[:, ::-1] for row in rows)])
+    away = np.min([np.linalg.norm(feet[:, None] - axis[None], axis=2).min(axis=1) for axis in axes], axis=0)
+    top = 0.5 * WIRE + np.sqrt(np.clip((TIP + 0.5 * WIRE) ** 2 - away**2, 0.0, None))
+    height = np.maximum(top, TIP) + 0.6 * NOISE * np.random.default_rng(11).standard_normal(len(feet))
+    sweep = np.repeat(np.arange(2 * len(places)), len(run))
+    return Trace(1e-3 * np.arange(len(feet)), np.column_stack([feet, height]), sweep, TIP)
+
+
+def stroke(*corners: tuple[float, float]) -> FloatArray:
+    """A polyline with corners in mm, every 50 um, m."""
+    line = 1e-3 * np.array(corners)
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    even = np.arange(0.0, s[-1], 50e-6)
+    return np.column_stack([np.interp(even, s, line[:, 0]), np.interp(even, s, line[:, 1])])
+
+
+def test_a_ring_that_rows_run_beside_is_one_closed_ridge_not_a_wide_one() -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, 900)
+    trace = felt([7e-3 * np.column_stack([np.cos(turn), np.sin(turn)]) + [0.5e-3, 0.9e-3]])
+    base = fit_base(trace)
+    (ring,) = assemble(detect(trace, base), trace, base)
+    assert ring.kind == "ridge" and ring.closed
+    assert np.abs(np.hypot(ring.axis[:, 0] - 0.5e-3, ring.axis[:, 1] - 0.9e-3) - 7e-3).max() < 0.2e-3
+    assert ring.height.median == pytest.approx(WIRE, abs=0.02e-3)
+
+
+def test_the_strokes_of_a_letter_are_three_ridges() -> None:
+    letter = stroke((-6.0, 7.0), (6.0, 7.0), (-6.0, -7.0), (6.0, -7.0))
+    trace = felt([letter @ np.array([[0.8, 0.6], [-0.6, 0.8]])])
+    base = fit_base(trace)
+    found = assemble(detect(trace, base), trace, base)
+    assert [feature.kind for feature in found] == ["ridge"] * 3
+    assert max(feature.width.median for feature in found) < 2.0 * WIRE
