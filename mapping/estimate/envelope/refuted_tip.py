@@ -60,14 +60,17 @@ class _Sought(NamedTuple):
         jump: power of a share of the distance above whose rise over that share a bend is a jump: of a circle it is 2,
             of a kink 1, of a jump 0.
         block: fewest samples of a block: the smallest share is over one of them.
+        either: True if a rise to the other side is a jump, too: beside a reading that dropped out the path bends
+            outwards at both shoulders.
     """
 
     jump: float
     block: int
+    either: bool
 
 
 # A radius is refuted by circles alone; a side by kinks, too, which are sharper the smaller the blocks are
-ARCS, KINKS = _Sought(1.0, 4), _Sought(0.5, 2)
+ARCS, KINKS = _Sought(1.0, 4, False), _Sought(0.5, 2, True)
 
 
 @dataclass(frozen=True)
@@ -242,7 +245,7 @@ class _Path:
             self.scales[-1].product, self.scales[-1].usable = np.zeros(0), np.zeros(0, dtype=bool)
         self.scales.append(_Scale(size, stride, rise, product, usable, self.levels, len(self)))
 
-    def told(self, radius: float, resolution: float, jump: float) -> _Bends:
+    def told(self, radius: float, resolution: float, sought: _Sought) -> _Bends:
         """Bends of the largest blocks that noise cannot have made, nor a jump, and a ball of the radius hardly."""
         scale = self.scales[-1]
         unsure = BEND_SDS * scale.sd + resolution
@@ -253,7 +256,7 @@ class _Path:
         sharp = np.where(bent, surely / np.where(bent, scale.product, 1.0), -np.inf)
         around = np.concatenate([[-np.inf], sharp, [-np.inf]])
         peaks = np.flatnonzero(bent & (sharp >= around[:-2]) & (sharp > around[2:]))
-        peaks = peaks[~self._jumps(peaks, jump)]
+        peaks = peaks[~self._jumps(peaks, sought)]
         product, beside = scale.product[peaks], np.arange(-BESIDE_BLOCKS, BESIDE_BLOCKS + 1)
         at = self._means(peaks)
         path = self._means(np.clip(peaks[:, None] + beside, 0, len(scale.rise) - 1))
@@ -269,11 +272,11 @@ class _Path:
         begin = k * scale.stride + scale.size
         return np.asarray((self.sums[begin + scale.size] - self.sums[begin]) / scale.size)
 
-    def _jumps(self, peaks: IntArray, jump: float) -> BoolArray:
+    def _jumps(self, peaks: IntArray, sought: _Sought) -> BoolArray:
         """(K,) True where smaller blocks within those of a bend bend as far, as a jump does and no circle.
 
         Over a share q of the distance a circle rises by q^2, a kink by q, a jump by 1: one is whatever rises by more
-        than q to the power of `jump`.
+        than q to the power of `sought.jump`.
         """
         scale = self.scales[-1]
         jumps = np.zeros(len(peaks), dtype=bool)
@@ -281,10 +284,10 @@ class _Path:
             share = part.size / scale.size
             within = np.arange(3 * (scale.size - part.size) // part.stride + 1)
             inside = np.minimum((peaks * scale.stride // part.stride)[:, None] + within, len(part.rise) - 1)
-            rise = part.rise[inside]
+            rise = np.abs(part.rise[inside]) if sought.either else part.rise[inside]
             if share < SHORTEST_JUMP_SHARE:
                 rise = rise - SURE_JUMP_SDS * part.sd_of(inside)
-            jumps |= rise.max(axis=1) >= share**jump * scale.rise[peaks]
+            jumps |= rise.max(axis=1) >= share**sought.jump * scale.rise[peaks]
         return jumps
 
 
@@ -337,7 +340,7 @@ def _over_all_sizes(paths: list[_Path], radius: float, resolution: float, sought
         for path in paths:
             path.scales[-1].levels = scatter * path.scales[-1].levels
             if size >= sought.block:
-                yield path.told(radius, resolution, sought.jump)
+                yield path.told(radius, resolution, sought)
         size *= 2
 
 

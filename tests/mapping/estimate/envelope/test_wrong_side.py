@@ -56,3 +56,12 @@ def test_smooth_dips_all_downwards_do_not_turn_a_bare_plate_over() -> None:
     for row, begin in zip(rng.integers(0, ROWS, 60), rng.integers(0, 560, 60), strict=True):
         heights[row, begin : begin + 40] -= rng.uniform(0.02, 0.3) * np.hanning(40)
     assert asked(heights) is None
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_single_readings_that_drop_out_everywhere_do_not_turn_a_bare_plate_over(seed: int) -> None:
+    """Their shoulders bend outwards, and their bottoms are jumps, which count for nothing."""
+    rng = np.random.default_rng(seed)
+    heights = TIP + 0.5 * NOISE * rng.standard_normal((20, 600))
+    heights[rng.integers(0, 20, 600), rng.integers(0, 600, 600)] -= rng.uniform(0.05, 0.5, 600)
+    assert asked(heights) is None
