@@ -57,7 +57,14 @@ from mapping.estimate.deviation import (
     unclimbed_levels,
     yielding,
 )
-from mapping.estimate.envelope import RefutedTip, estimate_surface, refuted_by_lines, refuted_tip
+from mapping.estimate.envelope import (
+    RefutedTip,
+    WrongSide,
+    estimate_surface,
+    refuted_by_lines,
+    refuted_tip,
+    wrong_side,
+)
 from mapping.geometry.curvature import principal_curvatures
 from mapping.geometry.mesh import distances
 from mapping.inference.joint import refine_all
@@ -87,6 +94,9 @@ MOST_STANDING = 5
 
 # Why a stage that does not tell existence, places and sizes was left out
 NOT_IN_QUICK = "quick results were asked for: existence, places and sizes"
+
+# Bases that have an inside
+WITH_INSIDE = ("sphere", "cylinder", "tube", "star body")
 
 # Rounds in which crests and the play of the axes settle: the first finds crests that the play has moved. A simulated
 # play as large as the noise is found to 0.86 of it by the first and to 0.97 by the last, two to four in all; one twice
@@ -144,6 +154,7 @@ class Work:
         judgements: what became of the tolerances.
         apart: samples left out for that.
         refuted_tip: what the trace says against the radius of the tip; None if nothing.
+        side: what the trace says against the side of the path that the body was taken to lie on; None if nothing.
         sparse: what lies unfelt between samples that are further apart than the ball is wide; None if they are not.
         roughness: what the surface is like beside the features.
         standard_heights: what its ridges, grooves and steps measure by the standards.
@@ -176,6 +187,7 @@ class Work:
     deviation: Deviation | None = None
     apart: int = 0
     refuted_tip: RefutedTip | None = None
+    side: WrongSide | None = None
     sparse: SparseSamples | None = None
     roughness: Roughness | None = None
     standard_heights: tuple[StandardHeight, ...] = ()
@@ -388,6 +400,19 @@ def made_sound(work: Work, share: Share) -> None:
     work.sound = sound_sweeps(work.laid, work.base)
     if work.sound.cuts:
         work.laid = work.trace = work.sound.trace
+
+
+def side_asked(work: Work, share: Share) -> None:
+    """The side of the path that the body lies on, held against the trace's kinks; where it is a round body's wrong one,
+    the base is turned over: positions alone do not tell a bore from a shaft."""
+    alone = work.given is None and not work.trace.has_contact_data
+    work.side = wrong_side(work.laid) if alone and not work.log.detections else None
+    if work.side is not None and work.base.kind in WITH_INSIDE:
+        hollow = bool(work.base.parameters.get("hollow", False))
+        work.base = fit_base(work.trace, form=work.log.form, inside=not hollow)
+        work.side = replace(work.side, turned=True)
+        kept_over_base(work, share)
+        made_sound(work, share)
 
 
 def tip_asked(work: Work, share: Share) -> None:
@@ -759,6 +784,7 @@ def modelled(work: Work, share: Share) -> None:
     deviation = {} if work.deviation is None else {"deviation": work.deviation.record()}
     yields = {} if work.yielding is None else {"yielding": work.yielding.record()}
     refuted = {} if work.refuted_tip is None else {"refuted_tip": work.refuted_tip.record()}
+    side = {} if work.side is None else {"wrong_side": work.side.record()}
     sparse = {} if work.sparse is None else {"sparse_samples": work.sparse.record()}
     behind = {} if work.backlash is None else {"backlash": work.backlash.record()}
     curved = {} if work.curvature is None else {"curvature": work.curvature.record()}
@@ -773,6 +799,7 @@ def modelled(work: Work, share: Share) -> None:
         | yields
         | deviation
         | refuted
+        | side
         | sparse
         | behind
         | curved

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from mapping.detection import Detections
     from mapping.detection.path import PathLedger, SparseSamples
     from mapping.estimate.deviation import Deviation, Yielding
-    from mapping.estimate.envelope import Estimate, RefutedTip
+    from mapping.estimate.envelope import Estimate, RefutedTip, WrongSide
     from mapping.geometry.curvature import Curvature
 
 
@@ -97,6 +97,7 @@ class Analysis:
         yielding: what the finger yields by under the recorded forces, put back; None if nothing is known of it.
         deviation: what the given model gets wrong at long wavelengths, None if nothing.
         refuted_tip: what the trace says against the radius of the tip, None if nothing.
+        side: what the trace says against the side of the path that the body was taken to lie on, None if nothing.
         sparse: what lies unfelt between samples that are further apart than the ball is wide, None if they are not.
         judgements: what became of each tolerance.
         roughness: what the surface is like beside the features; None where a trace cannot tell.
@@ -129,6 +130,7 @@ class Analysis:
     yielding: Yielding | None = None
     deviation: Deviation | None = None
     refuted_tip: RefutedTip | None = None
+    side: WrongSide | None = None
     sparse: SparseSamples | None = None
     judgements: tuple[Judgement, ...] = ()
     roughness: Roughness | None = None

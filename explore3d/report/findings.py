@@ -169,6 +169,16 @@ def tip_warning(analysis: Analysis) -> list[str]:
             f"Warning: {refuted.sentence()}. All that follows rests on that radius and is not to be believed: is its "
             f"unit right? Give the right one with {where}, or with --tip-sd how far it may be off."
         )
+    side = analysis.side
+    if side is not None and side.turned:
+        way = "inside" if analysis.base.parameters.get("hollow") else "outside"
+        told.append(f"The body was felt from {way}: by the other side, {side.sentence()}.")
+    elif side is not None:
+        told.append(
+            f"Warning: the body seems to lie on the other side of the path: {side.sentence()}. What follows takes what "
+            "stands out for what is hollow. z must point away from the body: turn the table by rotation = [[1, 0, 0], "
+            "[0, -1, 0], [0, 0, -1]] under [frame] in its sidecar."
+        )
     if sparse is not None:
         told.append(
             f"Warning: {sparse.sentence()}. Nothing that follows holds between the samples: is the unit of the radius "

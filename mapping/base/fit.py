@@ -73,7 +73,9 @@ AREAL_FORMS: dict[str, tuple[Family, ...]] = {
 }
 
 
-def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO, *, tested: bool = True) -> Base:
+def fit_base(
+    trace: Trace, spacing: float | None = None, form: Form = AUTO, *, tested: bool = True, inside: bool | None = None
+) -> Base:
     """The smooth body that explains most of a trace; details shorter than about eight tip radii are left out.
 
     A trace along one line gives a profile. Otherwise every family is fitted to the ball centres by robust
@@ -91,6 +93,7 @@ def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO, *, t
             shape allows.
         form: of a profile; over an area "auto", "line" (a plane) or "arc" (a cylinder or a sphere).
         tested: False to spare the test whether a fit to half of the sweeps foretells the others (Base.missed is None).
+        inside: whether a round body was felt from inside, where that is known; None: as above.
 
     Raises:
         FormError: a form that is not possible over an area, or not for this profile.
@@ -107,7 +110,7 @@ def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO, *, t
             f"form {form.kind!r} is for profiles along one line, and this trace covers an area; possible: "
             f"{', '.join(AREAL_FORMS)}"
         )
-    cloud = Cloud.of(trace.select(form.unmasked(trace)) if form.masks else trace, MOST_BASE_CELLS)
+    cloud = Cloud.of(trace.select(form.unmasked(trace)) if form.masks else trace, MOST_BASE_CELLS, inside)
     fits = _fits(AREAL_FORMS[form.kind], cloud)
     if not fits:
         raise FormError(f"form {form.kind!r}: none of its bodies can be fitted to this trace; possible: auto, line")

@@ -19,6 +19,12 @@ from mapping.instrument import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_fit, robu
 BELOW = -0.6
 # Share of the scatter of second differences below which that of fourth ones shows that the sweeps bend
 BENT_SCATTER_SHARE = 0.5
+# Cells that are asked for the body's normal: the median of so many knows the scatter to 5 %
+ASKED_FOR_NORMAL = 500
+# The path goes on beside itself where its way there is so many times the distance: beyond half a circle (pi / 2)
+OTHER_PASS = 2.0
+# Cosine of the least angle to the path at which a line to a neighbour tells the normal
+HALF_RIGHT = float(np.sqrt(0.5))
 
 
 # Columns (N, P) of a field that is linear in its coefficients, at x and y (N,)
@@ -36,6 +42,7 @@ class Cloud:
         tip_radius: m.
         outward: (C, 3) measured contact normals in the frame, or None.
         sweep: (C,) of each point.
+        inside: whether a round body was felt from inside, where that is known; else None.
     """
 
     points: FloatArray
@@ -45,9 +52,10 @@ class Cloud:
     tip_radius: float
     outward: FloatArray | None
     sweep: IntArray
+    inside: bool | None = None
 
     @classmethod
-    def of(cls, trace: Trace, most: int) -> Cloud:
+    def of(cls, trace: Trace, most: int, inside: bool | None = None) -> Cloud:
         """The thinned cloud of a trace: means of consecutive samples, at most `most` of them."""
         cells = Cells.of(trace, most)
         means, normals = cells.centers, cells.normals
@@ -60,7 +68,9 @@ class Cloud:
             axes = np.stack([axes[0], -axes[1], axes[2]])
         points = (means - origin) @ axes.T
         outward = None if normals is None else normals @ axes.T
-        return cls(points, origin, axes, _roughness(points), trace.tip_radius, outward, cells.sweep)
+        return cls(
+            points, origin, axes, _roughness(points, cells.sweep), trace.tip_radius, outward, cells.sweep, inside
+        )
 
     def world(self, points: FloatArray) -> FloatArray:
         """Points (N, 3) of the frame in the object frame."""
@@ -71,6 +81,8 @@ class Cloud:
 
         The contact normals tell; without them it is so if all was felt below the middle, as in a bowl.
         """
+        if self.inside is not None:
+            return self.inside
         if self.outward is not None:
             return float((self.outward * away).sum(axis=1).mean()) < 0.0
         return float((away.mean(axis=0) @ self.axes)[2]) < BELOW
@@ -91,25 +103,51 @@ class Cloud:
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
 
 
-def _roughness(points: FloatArray) -> float:
-    """Scatter of neighbouring cells about a smooth curve through them, across the curve.
+def _roughness(points: FloatArray, sweep: IntArray) -> float:
+    """Scatter of neighbouring cells about a smooth curve through them, along the body's normal.
 
     Second differences tell it on flat bodies; on round ones they tell the bend of the sweeps, and fourth ones the
-    scatter.
+    scatter, which are taken across the curve: a normal of neighbours is off where sweeps lie far apart.
     """
     along = points[2:] - points[:-2]
     bend, length = np.diff(points, 2, axis=0), np.linalg.norm(along, axis=1)
     even = (np.linalg.norm(bend, axis=1) < 0.5 * length) & (length > 0)
     if even.sum() < 8:
         return 0.0
-    flat = float(robust_scale(bend[even, 2]) / np.sqrt(6.0))
+    ways = along / np.where(length > 0, length, 1.0)[:, None]
+    asked = np.flatnonzero(even)[:: max(1, int(even.sum()) // ASKED_FOR_NORMAL)]
+    normal = _normals(points, sweep, asked + 1, ways[asked])
+    known = np.isfinite(normal[:, 0])
+    off = (bend[asked] * normal)[known].sum(axis=1) if known.sum() >= 8 else bend[even, 2]
+    flat = float(robust_scale(off) / np.sqrt(6.0))
     smooth = even[2:] & even[1:-1] & even[:-2]
     if smooth.sum() < 8:
         return flat
-    rest, way = np.diff(points, 4, axis=0)[smooth], along[1:-1][smooth] / length[1:-1][smooth, None]
+    rest, way = np.diff(points, 4, axis=0)[smooth], ways[1:-1][smooth]
     rest -= (rest * way).sum(axis=1)[:, None] * way
     bent = float(MAD_TO_SD * np.median(np.linalg.norm(rest, axis=1)) / np.sqrt(70.0))
     return bent if bent < BENT_SCATTER_SHARE * flat else flat
+
+
+def _normals(points: FloatArray, sweep: IntArray, at: IntArray, ways: FloatArray) -> FloatArray:
+    """Unit normals (K, 3), of either sign, at some cells (K,) with the ways (K, 3) of the path through them.
+
+    They are square to the path and to the line to the nearest place of another pass; NaN where there is none. The
+    least principal axis of all centres, which is a plate's normal, is the axis of rings round a short cylinder.
+    """
+    run = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    step = float(np.median(np.diff(run)))
+    normals = np.full((len(at), 3), np.nan)
+    for row, (cell, way) in enumerate(zip(at, ways, strict=True)):
+        line = points - points[cell]
+        apart = np.linalg.norm(line, axis=1)
+        other = (sweep != sweep[cell]) | (np.abs(run - run[cell]) > OTHER_PASS * apart)
+        other &= (apart > 0.5 * step) & (np.abs(line @ way) < HALF_RIGHT * apart)
+        if other.any():
+            candidates = np.flatnonzero(other)
+            normal = np.cross(way, line[candidates[apart[candidates].argmin()]])
+            normals[row] = normal / np.linalg.norm(normal)
+    return normals
 
 
 def independent_share(correlation: float) -> float:

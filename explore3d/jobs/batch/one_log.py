@@ -121,7 +121,8 @@ def _analysed(job: Job) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 def _known(analysis: Analysis) -> dict[str, Any]:
     detections = analysis.detections
     noise, limit = detections.noise, float(detections.detection_limit)
-    of_tip = [each.sentence() for each in (analysis.refuted_tip, analysis.sparse) if each is not None]
+    told = analysis.refuted_tip, analysis.side, analysis.sparse
+    of_tip = [each.sentence() for each in told if each is not None]
     return {
         "samples": int(analysis.model.provenance["samples"]),
         "features": len(analysis.model.features),

@@ -21,7 +21,9 @@ from mapping.instrument import MAD_TO_SD, Noise
 # their intervals are 17 with 1, 20 with 2, 21 with 3 and with 5
 ALIGNMENTS = 3
 # Sides that rise by this share of the height between two samples are blurred in a mean of sweeps that sample elsewhere:
-# its width is by up to a sample's distance too large. Gentler sides rise by half of this in bins of an eighth of the
+# its width is by up to a sample's distance too large, and the arc of a ball that rolls over an edge looks like a flank
+# further out: of a rectangle of 1 x 0.2 mm under a ball of 2 mm the mean of 20 sweeps makes at least 1.7 mm, each of
+# them 1.00. Both are the mean of the sweeps' own. Gentler sides rise by half of this in bins of an eighth of the
 # width (LEAST_BINS), walls by all of the height: 0.15 and 0.4 are alike
 BLURRED = 0.25
 # What lies farther than this share of the width from the middle is beside a mean section: half of it is the section's
@@ -78,11 +80,11 @@ def _of_mean(group: Sequence[FreeSection], square: FloatArray, tip: float, noise
             sizes = sizes_of_section(section, tip, noise)
             if sizes is None or float(np.median([each.sizes.steep for each in group])) < BLURRED:
                 return sizes
-            width = float(np.mean(square * [each.sizes.width for each in group]))
-            doubt = float(np.median([each.sizes.foot_doubt for each in group]))
-            if sizes.most == sizes.least:
-                sizes = replace(sizes, least=width, most=width)
-            return replace(sizes, width=width, foot_doubt=doubt)
+            own = [each.sizes.across(float(by)) for each, by in zip(group, square, strict=True)]
+            width, least, most = (float(np.mean([getattr(s, k) for s in own])) for k in ("width", "least", "most"))
+            least_sd = float(np.mean([each.least_sd for each in own])) / np.sqrt(len(own))
+            doubt = float(np.median([each.foot_doubt for each in own]))
+            return replace(sizes, width=width, foot_doubt=doubt, least=least, most=most, least_sd=least_sd)
         piece, noise = piece.coarser(), noise.scaled(white=2.0**-0.5)
     return None
 

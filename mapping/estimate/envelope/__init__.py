@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from mapping.estimate.envelope.profile_envelope import envelope_heights as envelope_heights
     from mapping.estimate.envelope.refuted_tip import RefutedTip as RefutedTip, refuted_tip as refuted_tip
     from mapping.estimate.envelope.sweep_mesh import sweep_faces as sweep_faces
+    from mapping.estimate.envelope.wrong_side import WrongSide as WrongSide, wrong_side as wrong_side
 
 _PUBLIC = {
     "bent_lines": ("refuted_by_lines",),
@@ -19,5 +20,6 @@ _PUBLIC = {
     "profile_envelope": ("envelope_heights",),
     "refuted_tip": ("RefutedTip", "refuted_tip"),
     "sweep_mesh": ("sweep_faces",),
+    "wrong_side": ("WrongSide", "wrong_side"),
 }
 doorway(__name__, _PUBLIC)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,6 +51,26 @@ LEVEL_WINDOW, FEWEST_SCATTERED, SCATTERED = 256, 40, 4000
 UP_PLACES, MOST_BENDS = 24, 2000
 # Factor between the radii that are tried: the largest is told with two digits.
 RADIUS_STEP = 1.02
+
+
+class _Sought(NamedTuple):
+    """What bends are looked for.
+
+    Args:
+        jump: power of a share of the distance above whose rise over that share a bend is a jump: of a circle it is 2,
+            of a kink 1, of a jump 0.
+        block: fewest samples of a block: the smallest share is over one of them.
+        either: True if a rise to the other side is a jump, too: beside a reading that dropped out the path bends
+            outwards at both shoulders.
+    """
+
+    jump: float
+    block: int
+    either: bool
+
+
+# A radius is refuted by circles alone; a side by kinks, too, which are sharper the smaller the blocks are
+ARCS, KINKS = _Sought(1.0, 4, False), _Sought(0.5, 2, True)
 
 
 @dataclass(frozen=True)
@@ -106,6 +126,19 @@ def refuted_tip(laid: LaidTrace, tip_sd: float = 0.0) -> RefutedTip | None:
     return RefutedTip(laid.tip_radius, largest, places, chance)
 
 
+def sharp_bends(laid: LaidTrace, side: float) -> int:
+    """How many places of the sweeps bend, or have a kink, away from one side of the base, as no ball's path does there.
+
+    What noise makes on two sweeps side by side is two things: each sweep counts.
+
+    Args:
+        laid: the trace, outliers included.
+        side: 1.0: outwards; -1.0: as outwards would be if the body lay on the other side of the path.
+    """
+    bends = _apart(_measured(laid, side, KINKS), alone=True)
+    return int((bends.most < LEANT_ALONG * laid.tip_radius).sum())
+
+
 @dataclass(frozen=True, eq=False)
 class _Bends:
     """Places where the trace bends outwards, K of them.
@@ -115,6 +148,7 @@ class _Bends:
         reach: (K,) half the length over which each was measured, m.
         least, most: (K,) radii between which that of the bend lies, m.
         height: (K,) by which it stands above the path beside it, at most, m.
+        sweep: (K,) number of the sweep.
     """
 
     at: FloatArray
@@ -122,12 +156,14 @@ class _Bends:
     least: FloatArray
     most: FloatArray
     height: FloatArray
+    sweep: IntArray
 
     def select(self, index: IntArray | BoolArray | slice) -> _Bends:
         return _Bends(*(getattr(self, each.name)[index] for each in fields(self)))
 
 
-_NO_BENDS = _Bends(np.zeros((0, 3)), *(np.zeros(0) for _ in range(4)))
+_NONE = np.zeros(0)
+_NO_BENDS = _Bends(np.zeros((0, 3)), _NONE, _NONE, _NONE, _NONE, np.zeros(0, dtype=np.int64))
 
 
 def _by_chance(bends: _Bends, radius: float) -> tuple[float, int]:
@@ -153,12 +189,17 @@ def _by_chance(bends: _Bends, radius: float) -> tuple[float, int]:
     return float(min(1.0, len(chances) * chances.min())), len(share)
 
 
-def _apart(bends: _Bends) -> _Bends:
-    """Of bends that overlap the sharpest: blocks of several sizes, and sweeps side by side, may see one thing."""
+def _apart(bends: _Bends, alone: bool = False) -> _Bends:
+    """Of bends that overlap the sharpest: blocks of several sizes, and sweeps side by side, may see one thing.
+
+    Args:
+        alone: True to count each sweep's own.
+    """
     kept: list[int] = []
     for i in np.argsort(bends.most):
         away = np.linalg.norm(bends.at[kept] - bends.at[i], axis=1)
-        if (away >= np.maximum(bends.reach[kept], bends.reach[i])).all():
+        other = alone & (bends.sweep[kept] != bends.sweep[i])
+        if (other | (away >= np.maximum(bends.reach[kept], bends.reach[i]))).all():
             kept.append(int(i))
     return bends.select(np.array(kept, dtype=np.int64))
 
@@ -169,19 +210,20 @@ class _Path:
     Args:
         sweep: its samples.
         base: tells which way is up.
+        side: 1.0; -1.0 if the body lies on the other side of the path than the base says.
     """
 
-    def __init__(self, sweep: LaidSweep, base: Base) -> None:
+    def __init__(self, sweep: LaidSweep, base: Base, side: float = 1.0) -> None:
         centers = sweep.trace.centers
         count = len(centers)
-        self.origin = centers[0]
+        self.origin, self.number = centers[0], sweep.number
         self.sums = np.zeros((count + 1, 3))
         np.cumsum(centers - self.origin, axis=0, out=self.sums[1:])
         # over many samples, which noise does not lengthen
         many = max(1, count // UP_PLACES)
         self.step = float(np.median(np.linalg.norm(np.diff(centers[::many], axis=0), axis=1))) / many
         knots = np.unique(np.linspace(0, count - 1, min(count, UP_PLACES)).astype(np.int64))
-        up = base.foot(centers[knots], sweep.trace.tip_radius).normals
+        up = side * base.foot(centers[knots], sweep.trace.tip_radius).normals
         level = np.abs(up - up[0]).max() < np.sqrt(np.finfo(float).eps)
         nearest = np.searchsorted(0.5 * (knots[1:] + knots[:-1]), np.arange(count))
         self.up = np.array(up[:1] if level else up[nearest])  # of one kind for the compiler
@@ -203,7 +245,7 @@ class _Path:
             self.scales[-1].product, self.scales[-1].usable = np.zeros(0), np.zeros(0, dtype=bool)
         self.scales.append(_Scale(size, stride, rise, product, usable, self.levels, len(self)))
 
-    def told(self, radius: float, resolution: float) -> _Bends:
+    def told(self, radius: float, resolution: float, sought: _Sought) -> _Bends:
         """Bends of the largest blocks that noise cannot have made, nor a jump, and a ball of the radius hardly."""
         scale = self.scales[-1]
         unsure = BEND_SDS * scale.sd + resolution
@@ -214,7 +256,7 @@ class _Path:
         sharp = np.where(bent, surely / np.where(bent, scale.product, 1.0), -np.inf)
         around = np.concatenate([[-np.inf], sharp, [-np.inf]])
         peaks = np.flatnonzero(bent & (sharp >= around[:-2]) & (sharp > around[2:]))
-        peaks = peaks[~self._jumps(peaks)]
+        peaks = peaks[~self._jumps(peaks, sought)]
         product, beside = scale.product[peaks], np.arange(-BESIDE_BLOCKS, BESIDE_BLOCKS + 1)
         at = self._means(peaks)
         path = self._means(np.clip(peaks[:, None] + beside, 0, len(scale.rise) - 1))
@@ -222,7 +264,7 @@ class _Path:
         height = np.einsum("kij,kj->ki", at[:, None] - path, np.broadcast_to(up, at.shape)).max(axis=1, initial=0.0)
         least = 0.5 * product / (scale.rise + unsure)[peaks]
         most = (1.0 + MEANS_BEND_MORE) * 0.5 * product / surely[peaks]
-        return _Bends(at + self.origin, np.sqrt(product), least, most, height)
+        return _Bends(at + self.origin, np.sqrt(product), least, most, height, np.full(len(peaks), self.number))
 
     def _means(self, k: IntArray) -> FloatArray:
         """(..., 3) means of the middle blocks of the largest scale's bends k, m, from the first sample on."""
@@ -230,10 +272,11 @@ class _Path:
         begin = k * scale.stride + scale.size
         return np.asarray((self.sums[begin + scale.size] - self.sums[begin]) / scale.size)
 
-    def _jumps(self, peaks: IntArray) -> BoolArray:
+    def _jumps(self, peaks: IntArray, sought: _Sought) -> BoolArray:
         """(K,) True where smaller blocks within those of a bend bend as far, as a jump does and no circle.
 
-        Over a share q of the distance a circle rises by q^2, a jump by 1; q is between them.
+        Over a share q of the distance a circle rises by q^2, a kink by q, a jump by 1: one is whatever rises by more
+        than q to the power of `sought.jump`.
         """
         scale = self.scales[-1]
         jumps = np.zeros(len(peaks), dtype=bool)
@@ -241,10 +284,10 @@ class _Path:
             share = part.size / scale.size
             within = np.arange(3 * (scale.size - part.size) // part.stride + 1)
             inside = np.minimum((peaks * scale.stride // part.stride)[:, None] + within, len(part.rise) - 1)
-            rise = part.rise[inside]
+            rise = np.abs(part.rise[inside]) if sought.either else part.rise[inside]
             if share < SHORTEST_JUMP_SHARE:
                 rise = rise - SURE_JUMP_SDS * part.sd_of(inside)
-            jumps |= rise.max(axis=1) >= share * scale.rise[peaks]
+            jumps |= rise.max(axis=1) >= share**sought.jump * scale.rise[peaks]
         return jumps
 
 
@@ -277,13 +320,13 @@ class _Scale:
         return np.asarray(k * self.stride + self.size + self.size // 2)
 
 
-def _measured(laid: LaidTrace) -> _Bends:
+def _measured(laid: LaidTrace, side: float = 1.0, sought: _Sought = ARCS) -> _Bends:
     """Every bend that may be sharper than the tip, over blocks of all sizes."""
-    paths = [_Path(sweep, laid.base) for sweep in laid.laid_sweeps if len(sweep.trace) > 3]
-    return _joined(list(_over_all_sizes(paths, laid.tip_radius, laid.resolution)))
+    paths = [_Path(sweep, laid.base, side) for sweep in laid.laid_sweeps if len(sweep.trace) > 3]
+    return _joined(list(_over_all_sizes(paths, laid.tip_radius, laid.resolution, sought)))
 
 
-def _over_all_sizes(paths: list[_Path], radius: float, resolution: float) -> Iterator[_Bends]:
+def _over_all_sizes(paths: list[_Path], radius: float, resolution: float, sought: _Sought) -> Iterator[_Bends]:
     size = 1
     while True:
         paths = [path for path in paths if len(path) >= 4 * size]
@@ -296,8 +339,8 @@ def _over_all_sizes(paths: list[_Path], radius: float, resolution: float) -> Ite
         scatter = robust_scale(np.concatenate(scattered)[:: 1 + count // SCATTERED])
         for path in paths:
             path.scales[-1].levels = scatter * path.scales[-1].levels
-            if SHORTEST_JUMP_SHARE * size >= 1.0:
-                yield path.told(radius, resolution)
+            if size >= sought.block:
+                yield path.told(radius, resolution, sought)
         size *= 2
 
 

@@ -46,6 +46,7 @@ def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.1
         refuted_tip=None,
         yielding=None,
         sparse=None,
+        side=None,
         refused=False,
         scene=None,
         path=None,

@@ -10,7 +10,9 @@ from scipy.ndimage import grey_dilation
 
 from mapping import Feature, FloatArray, Trace
 from mapping.assembly import assemble
-from mapping.base import fit_base
+from mapping.assembly.free import free_sections
+from mapping.assembly.free.mean_section import mean_sizes
+from mapping.base import LaidTrace, fit_base
 from mapping.detection import detect
 from mapping.geometry.templates.shapes import cap_height
 from mapping.inference.joint import refine_all
@@ -69,6 +71,27 @@ def test_a_wide_line_is_one_with_the_sizes_of_its_mean_section(
     assert abs(found.length.median - 121e-6) < PITCH
     assert not found.length.censored and found.evidence.crossings >= 7
     assert found.details.misfit is None
+
+
+def test_the_mean_section_of_rows_that_sample_elsewhere_bounds_a_ridge_with_sharp_edges_as_each_of_them() -> None:
+    """Their mean blurs the arcs on which the ball rolls over the edges."""
+    rng, tip, rows = np.random.default_rng(5), 2e-3, []
+    for k in range(20):
+        across = 0.042e-3 * (np.arange(-280, 280) + rng.uniform())
+        edge = np.maximum(np.abs(across) - 0.5e-3, 0.0)
+        height = np.maximum(0.2e-3 + np.sqrt(np.maximum(tip**2 - edge**2, 0.0)), tip) * (edge < tip)
+        height = np.maximum(height, tip) + 1e-6 * rng.standard_normal(len(across))
+        rows.append(np.column_stack([across, np.full(len(across), 1e-3 * k), height]))
+    centers = np.concatenate(rows)
+    raster = Trace(np.arange(len(centers)) * 1.0, centers, np.repeat(np.arange(20), len(centers) // 20), tip)
+    base = fit_base(raster)
+    found = detect(raster, base)
+    sections = free_sections(found, LaidTrace.of(raster, base))[0]
+    assert len(sections) == 20
+    sizes = mean_sizes(sections, np.ones(20), tip, found.noise)
+    assert sizes.least == pytest.approx(1e-3, rel=0.05)
+    # the foot may reach as far as the ball's way to the base
+    assert sizes.most == pytest.approx(1e-3 + 2.0 * np.sqrt(2.0 * tip * 0.2e-3 - 0.2e-3**2), rel=0.05)
 
 
 def test_a_line_that_widens_or_rises_says_so() -> None:

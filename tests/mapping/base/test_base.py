@@ -58,6 +58,19 @@ def test_radii_of_fitted_bodies_are_the_truth_less_the_tip() -> None:
         assert fit_base(_sweeps(CENTERS[kind])).parameters["radius"] == pytest.approx(BODY, abs=2e-5)
 
 
+@pytest.mark.parametrize(("pitch", "rings"), [(1e-3, 20), (10e-3, 3)])
+@pytest.mark.parametrize("inside", [False, True])
+def test_rings_about_a_short_cylinder_are_a_cylinder(pitch: float, rings: int, inside: bool) -> None:
+    """The axis is the direction that they scatter least in: what tells the noise of a plate tells nothing here."""
+    rng, turn = np.random.default_rng(4), np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False)
+    radius = (20e-3 + 1e-6 * rng.normal(size=(rings, 1000))).ravel()
+    around, level = np.tile(turn, rings), np.repeat(pitch * np.arange(rings), 1000)
+    centers = np.column_stack([radius * np.cos(around), radius * np.sin(around), level])
+    base = fit_base(Trace(np.arange(len(level)) * 1.0, centers, np.repeat(np.arange(rings), 1000), TIP), inside=inside)
+    assert base.kind == "cylinder"
+    assert base.parameters["radius"] == pytest.approx(22e-3 if inside else 18e-3, abs=1e-6)
+
+
 def test_a_feature_does_not_bend_the_fitted_plane() -> None:
     trace = _sweeps(CENTERS["plane"], bump=3e-4)
     height = fit_base(trace).foot(trace.centers, TIP).height
