@@ -181,6 +181,31 @@ def test_pieces_of_a_line_are_joined_with_their_section() -> None:
         np.testing.assert_array_equal(smooth.start[-3:], first.start[-3:])
 
 
+def test_pieces_are_one_course_where_they_are_nearest_and_what_runs_beside_it_leads_nowhere() -> None:
+    body = "burred groove"
+    groove = next(_true(true) for true in classified_body(body, FIRST_BUILT_WITH).truth if true.kind == "groove")
+    place, (start, stop) = _weighed_on(body, [groove]), groove.axis[[0, -1]]
+    half, along = np.linalg.norm(stop - start) / 2.0, (stop - start) / np.linalg.norm(stop - start)
+    aside = 0.5 * place.half_width * np.cross(along, [0.0, 0.0, 1.0])
+    # the longest, what goes on before it, and beside the longest what rules told a second time; the far end of the
+    # longest is nearer to that than either piece is long
+    axes = [
+        start + np.array([0.7, 2.0])[:, None] * half * along,
+        start + np.array([0.75, 0.0])[:, None] * half * along,
+        start + np.array([1.9, 0.8])[:, None] * half * along + aside,
+    ]
+    now = laid([part_of(replace(groove, axis=axis), place, 1) for axis in axes], place)
+    wholes = [parts[0] for parts in chained(now) if len(parts) == 1 and not parts[0].feature.closed]
+    assert wholes and len(wholes) == len(list(chained(now)))
+    for whole in wholes:
+        np.testing.assert_allclose(sorted(whole.feature.axis[[0, -1], 0]), sorted([start[0], stop[0]]), atol=1e-4)
+        assert abs(_length(whole.feature) - 2.0 * half) < 1e-4
+
+
+def _length(feature: Feature) -> float:
+    return float(np.linalg.norm(np.diff(feature.axis, axis=0), axis=1).sum())
+
+
 def test_samples_as_far_apart_as_places_were_felt_at_points() -> None:
     body = "flat bar"
     (bar,) = (_true(true) for true in classified_body(body, FIRST_BUILT_WITH).truth)
