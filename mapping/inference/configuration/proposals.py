@@ -271,16 +271,27 @@ def other_kinds(now: Configuration) -> Iterator[Parts]:
         if kind.sided or not kind.made_of:
             continue
         other, axis = kind_made_of(kind.made_of, line=not kind.line), axis_of(part)
-        if kind.line and float(arclengths(axis)[-1]) < AS_WIDE * half:
-            point = replace(part.feature, kind=other.name, axis=axis[[len(axis) // 2]],
-                            normals=part.feature.normals[:1])  # fmt: skip
-            yield [*rest, part_of(_plainly(point), now.place)]
+        point = as_point(replace(part.feature, axis=axis), now.place.around.trace.tip_radius)
+        if point is not None:
+            yield [*rest, part_of(point, now.place)]
         if not kind.line:
             shape: Any = part.shape
             like, half_length = replace(part.feature, kind=other.name), SHORT_LINE * half
             for way in shape.spot.axes:
                 short = axis + np.array([[-half_length], [half_length]]) * way
                 yield [*rest, _line(like, short, now.place)]
+
+
+def as_point(line: Feature, tip_radius: float) -> Feature | None:
+    """The point that may be meant instead of a line which is hardly longer than wide; None of others."""
+    kind = kind_of(line)
+    half = sizes_of(line, tip_radius).half_width
+    if not kind.line or kind.sided or not kind.made_of or float(arclengths(line.axis)[-1]) >= AS_WIDE * half:
+        return None
+    middle, point = len(line.axis) // 2, kind_made_of(kind.made_of, line=False)
+    normal = line.normals[min(middle, len(line.normals) - 1)]
+    nowhere = Interval(0.0, 0.0, 0.0)
+    return _plainly(replace(line, kind=point.name, axis=line.axis[[middle]], normals=normal[None], length=nowhere))
 
 
 def straight(now: Configuration, points: FloatArray) -> Iterator[Parts]:

@@ -219,6 +219,25 @@ def test_samples_as_far_apart_as_places_were_felt_at_points() -> None:
     assert off.max() < 1e-6
 
 
+def test_a_short_line_that_has_no_course_is_asked_as_the_point_that_it_may_be() -> None:
+    # where a body bends the chord of a bump that is told as a line leaves it; here both ends have one foot
+    height, tip = 0.4e-3, 10e-3
+    x, y = (each.ravel() for each in np.meshgrid(1e-4 * np.arange(-60, 61), 1e-3 * np.arange(-5, 6)))
+    points, up = np.column_stack([x, y, 0.0 * x]), np.tile([0.0, 0.0, 1.0], (len(x), 1))
+    felt = np.maximum(height - (x**2 + y**2) / (2.0 * tip), 0.0)
+    sweep = np.repeat(np.arange(11), 121)
+    noise = Noise(1e-6, 0.0, 1e-3)
+    places = Places(points, up, felt, np.ones(len(x), dtype=np.int64), sweep, 1e-4)
+    trace = Trace(1e-3 * np.arange(float(len(x))), points + (tip + felt)[:, None] * up, sweep, tip)
+    around = Surroundings(trace, plate(), noise)
+    size = Interval(height, 0.9 * height, 1.1 * height)
+    axis = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1e-3]])
+    line = Feature("ridge", axis, up[:2], size, size, Interval(1e-3, 5e-4, 2e-3), Support(50.0, 5), True, 1e-4)
+    features, _ = accounted([line], [], places, around, 0.01)
+    assert [feature.kind for feature in features] == ["bump"]
+    assert np.linalg.norm(features[0].axis[0, :2]) < 0.2e-3
+
+
 def _weighed_on(body: str, features: list[Feature], every: int = 20) -> Neighbourhood:
     """What was felt of a body without noise; one of so many samples, 6 um apart, is kept."""
     scene = classified_body(body, FIRST_BUILT_WITH)
