@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -65,6 +66,7 @@ class Waits:
     def ended(self) -> None:
         """The plan is over."""
         self._after = process_time() - self._since
+        gc.unfreeze()
 
     def computing(self, modelling: float) -> Computing:
         """The account of a run whose modelling took so long (s)."""
@@ -81,6 +83,8 @@ class Waits:
         return max(self.each[1:], default=0.0)
 
     def __call__(self, move: Move) -> Trace:
+        if not self.each:
+            gc.freeze()
         begin = process_time()
         self.each.append(begin - self._since)
         try:
@@ -326,7 +330,9 @@ class Explorer:
         if left <= 0:
             detail = f"the budget was spent before exploring began: {outcome.detail}"
             return Outcome("budget", detail, Explored(base))
-        plan = self.explore(base=base, time_budget=left).plan(count=None if watch is None else watch.begun())
+        plan = self.explore(base=base, time_budget=left).plan(
+            count=None if watch is None else watch.begun(), nothing_moved=self.locate is None and self.discover is None
+        )
         found, _ = self.carry_out(plan, base, execute, event, left)
         detail = f"{found.detail}; before that, to know the base: {outcome.detail}" if outcome.detail else found.detail
         return Outcome(found.reason, detail, Explored(base, found.value))

@@ -209,7 +209,6 @@ def _explore(
         watch = SurveyWatch(execute, log.event)
         try:
             outcome = explorer(scene, finger.workspace).go(watch, log.event, watch)
-            waits.ended()
         except BaseException as error:
             if log.samples:
                 stop = watch.stop(cause(error))
@@ -219,6 +218,8 @@ def _explore(
                 with suppress(UserError):  # of a full disk, for example: the log then ends without a word
                     log.event(OUTCOME, ended)
             raise
+        finally:
+            waits.ended()
         with _after_the_sweeps(session):
             if replay is not None:
                 replay.rest(log.write)

@@ -123,17 +123,23 @@ class Explore:
         """Sweeps with this fingertip on this base."""
         return Strokes(self.base, self.tip_radius, self.speed, self.force)
 
-    def plan(self, rng: np.random.Generator | None = None, count: SurveyCount | None = None) -> Plan:
+    def plan(
+        self, rng: np.random.Generator | None = None, count: SurveyCount | None = None, nothing_moved: bool = False
+    ) -> Plan:
         """The whole exploration; the outcome's value is a Found. Nothing in it is random: `rng` is not used.
 
         Args:
             count: is kept up while the survey goes on.
+            nothing_moved: True if no finger waits yet: all sweeps are laid out before the first move then, where the
+                noise is foretold. They are the same.
         """
         get_ready(self.tip_radius)
         found = Found(self.tip_radius, noise=self.noise)
         spent = Spent(25.0 * self.tip_radius if self.travel_speed is None else self.travel_speed)
         count = SurveyCount() if count is None else count
-        surveyor = Surveyor(self.survey, found, self.false_alarms_per_metre, self.stated, count, self.expected)
+        surveyor = Surveyor(
+            self.survey, found, self.false_alarms_per_metre, self.stated, count, self.expected, nothing_moved
+        )
         everything = self._everything(surveyor, found)
         outcome = yield from within(everything, spent, self.time_budget, self.path_budget)
         if found.surveyed:

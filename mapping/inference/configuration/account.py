@@ -22,7 +22,15 @@ from mapping.inference.configuration.neighbourhood import (
     neighbourhood,
     thin_half_width,
 )
-from mapping.inference.configuration.proposals import PEAK_SDS, PROPOSALS, Proposal, apart_of, as_far_as_felt, dense
+from mapping.inference.configuration.proposals import (
+    PEAK_SDS,
+    PROPOSALS,
+    Proposal,
+    apart_of,
+    as_far_as_felt,
+    as_point,
+    dense,
+)
 from mapping.inference.configuration.search import CROWDED, Account, searched
 from mapping.inference.configuration.told import in_words
 from mapping.inference.families import MEETING_REACH, PosteriorProblem, RidgeShape, Surroundings, TwinShape
@@ -163,12 +171,21 @@ def _lay(
         return
     place = _holding(beside, place)
     try:
-        parts = [_begun(feature, place) for feature in block.features]
-        start = fitted(parts, place)
+        block.laid = _laid_out(block.features, place)
     except MappingError:  # a feature over whose axis the base does not go on has no family here
-        return
+        features = [_posable(feature, place) for feature in block.features]
+        try:
+            block.laid, block.features = _laid_out(features, place), features
+        except MappingError:
+            return
+
+
+def _laid_out(features: Sequence[Feature], place: Neighbourhood) -> tuple[list[Part], Configuration]:
+    """The features' parts as they begin, and where they are likeliest. Raises MappingError."""
+    parts = [_begun(feature, place) for feature in features]
+    start = fitted(parts, place)
     assert start is not None
-    block.laid = parts, start
+    return parts, start
 
 
 def _improved(
@@ -225,6 +242,17 @@ def _begun(feature: Feature, place: Neighbourhood) -> Part:
     """The part of a feature, in the family that it was proposed in."""
     part, top = part_of(feature, place), feature.details.top
     return as_bar(part, place, top) if top and isinstance(part.shape, RidgeShape) else part
+
+
+def _posable(feature: Feature, place: Neighbourhood) -> Feature:
+    """The feature, or the point that a short line may be whose chord leaves the body, where that bends: no line has a
+    course there, and unless a point is asked for nothing is."""
+    try:
+        part_of(feature, place)
+    except MappingError:
+        point = as_point(feature, place.around.trace.tip_radius)
+        return feature if point is None else point
+    return feature
 
 
 def _holding(beside: Sequence[Feature], place: Neighbourhood) -> Neighbourhood:

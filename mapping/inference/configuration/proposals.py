@@ -157,7 +157,7 @@ def chained(now: Configuration) -> Iterator[Parts]:
             continue
         alike = [k for k, part in enumerate(now.parts) if kind_of(part.feature).made_of == made_of]
         alike = [k for k in alike if not now.parts[k].feature.closed]
-        course, used = _course_of([axis_of(now.parts[k]) for k in alike])
+        course, used = _course_of([axis_of(now.parts[k]) for k in alike], now.place.half_width)
         if not used:
             continue
         pieces = [now.parts[alike[k]] for k in used]
@@ -177,27 +177,39 @@ def chained(now: Configuration) -> Iterator[Parts]:
             yield [*rest, line]
 
 
-def _course_of(axes: list[FloatArray]) -> tuple[FloatArray, list[int]]:
-    """Points (K, 3) evenly along the pieces of a course, and the numbers of these: from the longest on, each time the
-    piece that begins nearest to where it ends, no farther off than one of them is long; none without a line."""
+def _course_of(axes: list[FloatArray], half_width: float) -> tuple[FloatArray, list[int]]:
+    """Points (K, 3) evenly along the pieces of a course, and the numbers of these; none without a line.
+
+    From the longest on, each time the piece and the end of the course that are nearest to each other, no farther apart
+    than one of them is long. A piece that runs beside the course, nearer than both are felt together (half_width, m),
+    is a part of it and leads nowhere.
+    """
     lengths = [float(arclengths(axis)[-1]) for axis in axes]
     if not any(lengths):
         return np.zeros((0, 3)), []
-    used = [int(np.argmax(lengths))]
-    course = _evenly(axes[used[0]])
-    for _ in range(2):  # on at its end, then at its beginning
-        while left := [k for k in range(len(axes)) if k not in used]:
-            gaps = [np.linalg.norm(axes[k][[0, -1]] - course[-1], axis=1) for k in left]
-            at = int(np.argmin([gap.min() for gap in gaps]))
-            nearest = left[at]
-            if gaps[at].min() > max(lengths[nearest], lengths[used[-1]]):
-                break
-            piece = _evenly(axes[nearest][:: 1 if gaps[at].argmin() == 0 else -1])
-            from_end = np.linalg.norm(piece - course[-1], axis=1).argmin()  # what lies before it runs beside the course
-            course = np.vstack([course, piece[from_end:]])
-            used.append(nearest)
-        course, used = course[::-1], used[::-1]
-    return _evenly(course), used
+    pieces = [_evenly(axis) for axis in axes]
+    longest = int(np.argmax(lengths))
+    course, used, last = pieces[longest], [longest], [longest, longest]  # the pieces that it begins and ends with
+    while True:
+        left = [k for k in range(len(pieces)) if k not in used]
+        beside = [k for k in left if np.median(distances(pieces[k], course)) < half_width]
+        if beside:
+            used += beside
+            continue
+        gaps = [
+            (float(np.linalg.norm(pieces[k][-of] - course[-at])), k, of, at)
+            for k, of, at in itertools.product(left, (0, 1), (0, 1))
+        ]
+        gap, nearest, of, at = min(gaps, default=(np.inf, longest, 0, 0))
+        if gap > max(lengths[nearest], lengths[last[at]]):
+            return _evenly(course), used
+        onward = course if at else course[::-1]
+        piece = pieces[nearest][::-1] if of else pieces[nearest]
+        from_end = np.linalg.norm(piece - onward[-1], axis=1).argmin()  # what lies before it runs beside the course
+        onward = np.vstack([onward, piece[from_end:]])
+        course = onward if at else onward[::-1]
+        used.append(nearest)
+        last[at] = nearest
 
 
 def _evenly(axis: FloatArray) -> FloatArray:
@@ -259,16 +271,27 @@ def other_kinds(now: Configuration) -> Iterator[Parts]:
         if kind.sided or not kind.made_of:
             continue
         other, axis = kind_made_of(kind.made_of, line=not kind.line), axis_of(part)
-        if kind.line and float(arclengths(axis)[-1]) < AS_WIDE * half:
-            point = replace(part.feature, kind=other.name, axis=axis[[len(axis) // 2]],
-                            normals=part.feature.normals[:1])  # fmt: skip
-            yield [*rest, part_of(_plainly(point), now.place)]
+        point = as_point(replace(part.feature, axis=axis), now.place.around.trace.tip_radius)
+        if point is not None:
+            yield [*rest, part_of(point, now.place)]
         if not kind.line:
             shape: Any = part.shape
             like, half_length = replace(part.feature, kind=other.name), SHORT_LINE * half
             for way in shape.spot.axes:
                 short = axis + np.array([[-half_length], [half_length]]) * way
                 yield [*rest, _line(like, short, now.place)]
+
+
+def as_point(line: Feature, tip_radius: float) -> Feature | None:
+    """The point that may be meant instead of a line which is hardly longer than wide; None of others."""
+    kind = kind_of(line)
+    half = sizes_of(line, tip_radius).half_width
+    if not kind.line or kind.sided or not kind.made_of or float(arclengths(line.axis)[-1]) >= AS_WIDE * half:
+        return None
+    middle, point = len(line.axis) // 2, kind_made_of(kind.made_of, line=False)
+    normal = line.normals[min(middle, len(line.normals) - 1)]
+    nowhere = Interval(0.0, 0.0, 0.0)
+    return _plainly(replace(line, kind=point.name, axis=line.axis[[middle]], normals=normal[None], length=nowhere))
 
 
 def straight(now: Configuration, points: FloatArray) -> Iterator[Parts]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from dataclasses import replace
 from pathlib import Path
 from time import process_time
@@ -185,3 +186,11 @@ def test_waits_are_what_the_program_takes_between_moves_and_not_what_the_finger_
     assert told.planning == pytest.approx(0.21, rel=0.1) and waits.carrying_out == pytest.approx(0.2, rel=0.1)
     assert told.median_wait == pytest.approx(0.02, rel=0.2) and told.worst_wait == pytest.approx(0.04, rel=0.2)
     assert "71 % of the finger's time" in told.sentence(1.0)
+
+
+def test_what_is_loaded_before_the_first_move_is_searched_for_garbage_after_the_last_one_alone():
+    frozen = list[int]()
+    waits = Waits(lambda move: frozen.append(gc.get_freeze_count()))  # type: ignore[arg-type, return-value]
+    waits(Move(np.zeros((2, 3)), np.array([[0.0, 0.0, -1.0]] * 2)))
+    waits.ended()
+    assert frozen[0] > gc.get_freeze_count() == 0

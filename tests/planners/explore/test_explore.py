@@ -395,3 +395,22 @@ def test_a_survey_is_worked_out_as_it_goes_and_knows_how_long_it_is():
     assert known == [1, 2, 3, 4, 6, 6, 7, 8, 9]  # no line before its time
     assert planned == [10] * 9  # one line more gives none, one line fewer is in two parts
     assert surveyor.metres == 20.0
+
+
+def test_a_survey_that_will_stand_is_worked_out_before_the_first_move():
+    pressed = list[int]()
+
+    def press(line):
+        pressed.append(line)
+        yield from {4: [], 5: [5, 50]}.get(line, [line])
+
+    survey = SimpleNamespace(visible=0.35, smallest=1e-3, lines=lambda visible: map(Line, range(8)), pressed=press)
+    survey.crossed = lambda visible: None
+    foretold = {"expected": 1e-4, "nothing_moved": True}
+    for settings in ({}, {"expected": 1e-4}, {"nothing_moved": True}, foretold):
+        pressed.clear()
+        surveyor = Surveyor(survey, Found(R), 1.0, **settings)
+        assert next(surveyor.plan()) == 0
+        assert pressed == (list(range(8)) if settings == foretold else [0])
+    assert surveyor.count.planned == 8  # in parts, of which one line has none and one two
+    assert list(surveyor._laid_out(at_once=True)) == list(surveyor._laid_out()) == [0, 1, 2, 3, 5, 50, 6, 7]

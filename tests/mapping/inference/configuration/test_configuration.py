@@ -181,6 +181,31 @@ def test_pieces_of_a_line_are_joined_with_their_section() -> None:
         np.testing.assert_array_equal(smooth.start[-3:], first.start[-3:])
 
 
+def test_pieces_are_one_course_where_they_are_nearest_and_what_runs_beside_it_leads_nowhere() -> None:
+    body = "burred groove"
+    groove = next(_true(true) for true in classified_body(body, FIRST_BUILT_WITH).truth if true.kind == "groove")
+    place, (start, stop) = _weighed_on(body, [groove]), groove.axis[[0, -1]]
+    half, along = np.linalg.norm(stop - start) / 2.0, (stop - start) / np.linalg.norm(stop - start)
+    aside = 0.5 * place.half_width * np.cross(along, [0.0, 0.0, 1.0])
+    # the longest, what goes on before it, and beside the longest what rules told a second time; the far end of the
+    # longest is nearer to that than either piece is long
+    axes = [
+        start + np.array([0.7, 2.0])[:, None] * half * along,
+        start + np.array([0.75, 0.0])[:, None] * half * along,
+        start + np.array([1.9, 0.8])[:, None] * half * along + aside,
+    ]
+    now = laid([part_of(replace(groove, axis=axis), place, 1) for axis in axes], place)
+    wholes = [parts[0] for parts in chained(now) if len(parts) == 1 and not parts[0].feature.closed]
+    assert wholes and len(wholes) == len(list(chained(now)))
+    for whole in wholes:
+        np.testing.assert_allclose(sorted(whole.feature.axis[[0, -1], 0]), sorted([start[0], stop[0]]), atol=1e-4)
+        assert abs(_length(whole.feature) - 2.0 * half) < 1e-4
+
+
+def _length(feature: Feature) -> float:
+    return float(np.linalg.norm(np.diff(feature.axis, axis=0), axis=1).sum())
+
+
 def test_samples_as_far_apart_as_places_were_felt_at_points() -> None:
     body = "flat bar"
     (bar,) = (_true(true) for true in classified_body(body, FIRST_BUILT_WITH).truth)
@@ -192,6 +217,25 @@ def test_samples_as_far_apart_as_places_were_felt_at_points() -> None:
     off = np.abs(place.window.height - shape.templates(part.start[None])[0])
     # means over 0.6 mm were 25 um off where the ball leaves the base
     assert off.max() < 1e-6
+
+
+def test_a_short_line_that_has_no_course_is_asked_as_the_point_that_it_may_be() -> None:
+    # where a body bends the chord of a bump that is told as a line leaves it; here both ends have one foot
+    height, tip = 0.4e-3, 10e-3
+    x, y = (each.ravel() for each in np.meshgrid(1e-4 * np.arange(-60, 61), 1e-3 * np.arange(-5, 6)))
+    points, up = np.column_stack([x, y, 0.0 * x]), np.tile([0.0, 0.0, 1.0], (len(x), 1))
+    felt = np.maximum(height - (x**2 + y**2) / (2.0 * tip), 0.0)
+    sweep = np.repeat(np.arange(11), 121)
+    noise = Noise(1e-6, 0.0, 1e-3)
+    places = Places(points, up, felt, np.ones(len(x), dtype=np.int64), sweep, 1e-4)
+    trace = Trace(1e-3 * np.arange(float(len(x))), points + (tip + felt)[:, None] * up, sweep, tip)
+    around = Surroundings(trace, plate(), noise)
+    size = Interval(height, 0.9 * height, 1.1 * height)
+    axis = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1e-3]])
+    line = Feature("ridge", axis, up[:2], size, size, Interval(1e-3, 5e-4, 2e-3), Support(50.0, 5), True, 1e-4)
+    features, _ = accounted([line], [], places, around, 0.01)
+    assert [feature.kind for feature in features] == ["bump"]
+    assert np.linalg.norm(features[0].axis[0, :2]) < 0.2e-3
 
 
 def _weighed_on(body: str, features: list[Feature], every: int = 20) -> Neighbourhood:
