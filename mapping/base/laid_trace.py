@@ -82,14 +82,15 @@ class LaidSweep:
     def feet_of_means(
         self, centers: FloatArray, first: IntArray, stop: int
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Where the means (n, 3) of runs of samples stand: points (n, 3), directions (n, 3), heights (n,) as in `Feet`.
+        """Where places (n, 3) amid runs of samples stand: points (n, 3), directions (n, 3), heights (n,) as in `Feet`.
 
-        Where the feet of all samples of a run are known and lie in one plane (to ONE_PLANE), the mean stands at the
-        mean of the feet: only the other means are laid. (Another face that bends towards the path within the run could
-        be nearer to the mean alone, by the square of the run's length over its distance.)
+        Where the feet of all samples of a run are known and lie in one plane (to ONE_PLANE), the mean of its centres
+        stands at the mean of the feet, and a place beside that beside it: only the others are laid. (Another face that
+        bends towards the path within the run could be nearer to the mean alone, by the square of the run's length over
+        its distance.)
 
         Args:
-            centers: of the runs, m.
+            centers: a place amid each of the runs, within a step of the mean of its centres, m.
             first: (n,) first sample of each.
             stop: past the last sample of the last one.
         """
@@ -98,7 +99,8 @@ class LaidSweep:
         if len(self._feet.height) and len(first):
             rows, counts = self._row[first[0] : stop], np.diff(np.append(first, stop))
             known = np.logical_and.reduceat(rows != NOT_LAID, first - first[0])
-            rows, counts = rows[np.repeat(known, counts)], counts[known]
+            samples = np.arange(first[0], stop)[np.repeat(known, counts)]
+            rows, counts = rows[samples - first[0]], counts[known]
         if known.any():
             starts = np.cumsum([0, *counts[:-1]])
             kept = _rows(self._feet, rows)
@@ -109,9 +111,14 @@ class LaidSweep:
             flat &= np.abs((apart * up).sum(1)) <= ONE_PLANE * np.linalg.norm(apart, axis=1)
             plane = np.logical_and.reduceat(flat, starts)
             known[known] = plane
-            for place, values in zip(found, (kept.points, kept.normals, kept.height), strict=True):
-                mean = np.add.reduceat(values, starts) / (counts if values.ndim == 1 else counts[:, None])
-                place[known] = mean[plane]
+            runs = (self.trace.centers[samples], kept.points, kept.normals, kept.height)
+            amid, points, normals, height = (np.add.reduceat(each, starts)[plane] for each in runs)
+            for each in (amid, points, normals, height):
+                each /= counts[plane].reshape(-1, *(1,) * (each.ndim - 1))
+            beside = centers[known] - amid
+            up = np.einsum("ij,ij->i", beside, normals)
+            found[0][known], found[1][known] = points + beside - up[:, None] * normals, normals
+            found[2][known] = height + up
         if not known.all():
             feet = self.base.foot(centers[~known], self.trace.tip_radius)
             for place, values in zip(found, (feet.points, feet.normals, feet.height), strict=True):

@@ -122,16 +122,18 @@ def probabilities(log_evidences: list[float]) -> FloatArray:
 def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, Posterior]]) -> Feature:
     """The feature with the sizes that all likely families agree on.
 
-    What most probably runs out has no foot: its width is that at half height, in all families. Beside a section with an
-    edge, whose width is that of its foot, what runs out counts as one that is as wide half way up.
+    Under a tip that is most probably worn flat the width is bounded from above alone: the flat makes a plateau of any
+    crest. What most probably runs out has no foot: its width is that at half height, in all families. Beside a section
+    with an edge, whose width is that of its foot, what runs out counts as one that is as wide half way up.
 
     Args:
         feature: as its most probable family describes it.
         likely: weight, problem and posterior of each family, the most probable one first.
     """
-    feature = replace(feature, notes=(*feature.notes, *_worn_note(likely)))
+    worn = _worn_note(likely)
+    feature = replace(feature, notes=(*feature.notes, *worn))
     kind, shapes = kind_of(feature), [_shape(problem) for _, problem, _ in likely]
-    if len(likely) == 1 and not isinstance(shapes[0], BellRidgeShape | TrapezoidShape):
+    if len(likely) == 1 and not worn and not isinstance(shapes[0], BellRidgeShape | TrapezoidShape):
         return feature
     bells = [isinstance(shape, BellShape | BellRidgeShape) for shape in shapes]
     total, foot = sum(share for share, _, _ in likely), 1.0
@@ -155,6 +157,8 @@ def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, P
     if np.mean(bridged > touched) < MOSTLY_BRIDGED:
         low, high = np.quantile(least, 0.05), np.quantile(most, 0.95)
         width = Interval(float(np.median(least[least == most])), float(low), float(high))
+        if worn:  # its flat makes the plateau: a sharper crest leaves this trace, too, which no round section tells
+            width = replace(width, low=0.0, censored=True, bounded=True)
         notes = (f"{known}; width at half height" if bells[0] else known,) if len(likely) > 1 else ()
         return replace(feature, height=interval, width=width, notes=(*feature.notes, *notes))
     low, high = np.quantile(touched, 0.05), np.quantile(bridged, 0.95)

@@ -238,6 +238,12 @@ def against_truth(
     """How many wires were found, whether their intervals hold them, and by which shares their heights are off.
 
     Where the analysis took the object for moved, a wire lies where it lies on the object.
+
+    Args:
+        analysis: of the recording.
+        path: that was recorded, without error.
+        truth: the wires.
+        crests: of each wire the places (K, 3) on the bare body's trace at which sweeps cross it, m.
     """
     pose = Pose.of(analysis.base)
     if pose is not None:
@@ -252,7 +258,8 @@ def against_truth(
     inside["place"] = [_place_inside(row.found, row.true.axis) for row in found if row.found and row.true]
     inside["crossing"] = []
     for crossing in analysis.detections.crossings:
-        gaps = [_away(crossing.point[None], crest)[0] for crest in crests]
+        place = crossing.point + path.tip_radius * crossing.normal
+        gaps = [_away(place[None], crest)[0] for crest in crests]
         gap, true = min(gaps), truth[int(np.argmin(gaps))]
         # a crossing near an end, or of nothing, has no place to compare with
         ends = np.linalg.norm(true.axis[[0, -1]] - crossing.point, axis=1).min()

@@ -153,9 +153,10 @@ def wired_path(
 ) -> tuple[Path, Base, tuple[TrueFeature, ...], tuple[FloatArray, ...]]:
     """The same over a body that wires lie on, across some of the sweeps; these wires, and where sweeps meet them.
 
-    A crossing is the foot of the ball's crest, and on facets a foot stays behind at an edge that the ball rolls over:
-    by r sin(0.5 deg) = 35 um for r = 4 mm where they meet at a degree. A wire lies where it lies, and is as high as it
-    stands over the facets: the round body's own surface is up to 2 um over them where its radius is 45 mm.
+    A sweep crosses a wire where the ball's centre is over it, lowered on to the bare body's trace: the foot on facets
+    stays behind at an edge that the ball rolls over, by r sin(0.5 deg) = 35 um for r = 4 mm where they meet at a
+    degree. A wire lies where it lies, and is as high as it stands over the facets: the round body's own surface is up
+    to 2 um over them where its radius is 45 mm.
 
     Args:
         draw: seed of the wires (see `wires_on`).
@@ -166,7 +167,7 @@ def wired_path(
         crest = base.foot(wire.axis + (wire.diameter + tip_radius) * wire.up, tip_radius)
         height = float(crest.height.mean())
         truth.append(TrueFeature("ridge", base.foot(wire.axis, tip_radius).points, height, wire.diameter))
-        crests.append(crest.points)
+        crests.append(crest.points + tip_radius * crest.normals)
     path, _ = _felt(body, joined(body.mesh, *(wire.mesh for wire in drawn)), base, tip_radius)
     return path, base, tuple(truth), tuple(crests)
 

@@ -79,7 +79,7 @@ def run_tip_case(case: TipCase) -> dict[str, Any]:
         | {"yields": None if analysis.yielding is None else analysis.yielding.record()}
         | {"told_offset": 0.0 if deviation is None else deviation.offset}
         | {"refuted": None if refuted is None else refuted.largest}
-        | against_truth(analysis, path, truth, [wire.axis for wire in wires])
+        | against_truth(analysis, path, truth, [wire.axis + said * wire.up for wire in wires])
     )
 
 

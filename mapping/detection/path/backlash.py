@@ -3,10 +3,12 @@
 The centre that is recorded hangs behind the true one by up to half the play of each axis: on the way up a crest it is
 too low, on the way down too high, and along a sweep every place lies too far back. The heights over all crossings tell
 the play: beside the crest that fits best, with its place and its width free, they go up later and come down later, and
-stay where the axis was left. Of each play that is tried the crests are fitted anew: what is seen of them lies too late
-and too low, and a path over those is turned too late. Its size is one number, and what is known of it is the likelihood
-of all crossings. Crests that are steeper on one side, or of another section, are so in proportion to their heights and
-end where they end: a section that all crossings have in common is marginalised.
+stay where the axis was left. So do they where a path round a body turns an axis back, though nothing stands there: they
+go from one level to another, by all of the play where that axis is normal to the body. Of each play that is tried the
+crests are fitted anew: what is seen of them lies too late and too low, and a path over those is turned too late. Its
+size is one number, and what is known of it is the likelihood of all crossings and turns. Crests that are steeper on one
+side, or of another section, are so in proportion to their heights and end where they end: a section that all crossings
+have in common is marginalised.
 
 What the play does along the sweeps is not felt on level ground: there the axes are taken to be alike, and places carry
 a doubt as large. Where the crossings do not decide whether there is a play, heights and places carry what it would do
@@ -41,6 +43,7 @@ WORTH_MENTIONING = float(0.5 * np.log(10.0))
 # many half-widths apart and as far out, of one of these standard deviations (those of theory equation 5.1, and one for
 # sections that are quite another)
 KNOT_STEP, KNOT_REACH, SECTION_SDS = 0.125, 1.5, (0.0, 0.01, 0.03, 0.1, 0.3)
+KNOTS = np.arange(-KNOT_REACH, KNOT_REACH + 0.5 * KNOT_STEP, KNOT_STEP)
 # A crossing is looked at with this many half-widths to either side of its crest, or to the middle between it and the
 # next: the axis stays where it was left, which seven half-widths of level on each side tell to 1 / sqrt(7) of what one
 # would. In so many bins at most, ten to a half-width: from the middle of one to its edge a crest falls by
@@ -53,6 +56,14 @@ WINDOW_FREEDOM = 5
 # noise (20 recordings of some 24 crossings) is 0.86 in the mean by that, by six steps the same to 0.002, and 0.69 by
 # crests as they were found
 CREST_STEPS, MOST_CREST_CHANGE = 2, 0.5
+# Turns of an axis that are asked, in so many bins with this many half-widths to either side, a half-width being half of
+# the way that the axis stands still on: two dozen of them with 18 bins at rest on either side tell half a play to
+# 2 / sqrt(24 * 36) = 0.07 standard deviations of a bin in white noise. A law that was fitted with the play in it has
+# its long waves in tones: a play of one standard deviation round a cylinder is worth 1.4 to 3 in the logarithm at each
+# turn. The axis is within 60 degrees of the normal
+MOST_TURNS, TURN_BINS, TURN_HALF_WIDTHS, ALONG_NORMAL = 24, 48, 4.0, 0.5
+# Of a turn free are offset and slope of the base
+TURN_FREEDOM = 2
 # Crossings that are asked: two hundred of 160 bins tell half a play of 1 / sqrt(200 * 160) = 0.006 standard deviations
 # of a sample, less than the least that is tried
 MOST_WINDOWS = 200
@@ -146,19 +157,25 @@ def backlash(laid: LaidTrace, found: Detections, taken: Backlash | None = None) 
         least, lag = taken.play, taken.lag
     # where a play was taken off, what is no higher than it may be what was taken off too much or too little
     profiles = list(_profiles(laid, [c for c in found.crossings if abs(c.height) > least]))
-    crests = sum(len(profile.crests) for profile in profiles)
-    asked = [profile for profile in profiles if len(profile.crests)]
-    asked = asked[:: 1 + crests // MOST_WINDOWS]
-    windows = [window for profile in asked for window in profile.opened(found.noise, lag)]
-    if not windows or not sd > 0.0:
+    if not sd > 0.0:
         return None
-    # the path is reckoned with crests as they were recorded: higher than the play, or the axis would not have moved
     halves = sd * HALF_PLAYS
-    possible = halves <= 0.5 * float(np.median([abs(window.height) for window in windows]))
+    crests = sum(len(profile.crests) for profile in profiles)
+    crossed = [profile for profile in profiles if len(profile.crests)][:: 1 + crests // MOST_WINDOWS]
+    windows = [window for profile in crossed for window in profile.opened(found.noise, lag)]
+    # the path is reckoned with crests as they were recorded: higher than the play, or the axis would not have moved
+    most = 0.5 * float(np.median([abs(window.height) for window in windows])) if windows else np.inf
+    possible = halves <= most
     if not possible.any():
         return None
-    seen = [shapes for profile in asked for shapes in profile.seen([0.0, *halves[possible]])]
-    section = _Section(windows, seen)
+    tried = [0.0, *halves[possible]]
+    seen = [shapes for profile in crossed for shapes in profile.seen(tried)]
+    turns = [(profile, profile.turns(sd)) for profile in profiles]
+    turned = [each for each in turns if len(each[1])][:: 1 + sum(len(at) for _, at in turns) // MOST_TURNS]
+    at_turns = [profile.left_at(turns, tried, found.noise, lag) for profile, turns in turned]
+    if not windows and not sum(map(len, at_turns)):
+        return None
+    section = _Section(windows, seen, np.concatenate([np.zeros((0, len(tried))), *at_turns]))
     # what no play explains, as where two crests lie side by side, speaks for none: all is as unsure as it is off
     misfit = section.misfit()
     log = np.full(len(halves), -np.inf)
@@ -214,8 +231,8 @@ def _evidence(log: FloatArray) -> float:
 
 
 def _evidence_of_each(log: FloatArray, tried: int) -> float:
-    """The same if every crossing (W) hangs behind by an amount of its own, by these gains (W, H) of those that are
-    possible of so many, or by none: no machine does that."""
+    """The same if every crossing and turn (W) hangs behind by an amount of its own, by these gains (W, H) of those that
+    are possible of so many, or by none: no machine does that."""
     top = np.maximum(log.max(axis=1, initial=0.0), 0.0)
     own = LIKELY_PLAY * np.exp(log - top[:, None]).sum(axis=1) / tried + (1.0 - LIKELY_PLAY) * np.exp(-top)
     return float(np.sum(top + np.log(own)))
@@ -271,14 +288,32 @@ class _Profile:
 
     def opened(self, noise: Noise, taken: Lag | None) -> Iterator[_Window]:
         """A window about each crest that has enough about it."""
-        raw = self.heights.height - self._caps(self.crests)
-        if taken is not None:
-            raw = raw + np.einsum("ij,ij->i", taken.at(self.heights.t), self.normals)
+        raw = self._beside(taken)
         for which in range(len(self.crests)):
             window = _window(self, which, raw, noise)
             if window is not None:
                 self.windows[which] = window
                 yield window
+
+    def _beside(self, taken: Lag | None) -> FloatArray:
+        """(n,) heights beside all crests, with all of the play, m."""
+        raw = self.heights.height - self._caps(self.crests)
+        if taken is not None:
+            raw = raw + np.einsum("ij,ij->i", taken.at(self.heights.t), self.normals)
+        return raw
+
+    def turns(self, half: float) -> FloatArray:
+        """(T, 2) places where the path over the bare body turns an axis that stands on it, and half-widths of the way
+        on which one with half a play stands still there, m."""
+        behind, found = self.behind(half, self.crests[:0]), [np.zeros((0, 2))]
+        for axis in range(3):
+            ends = np.flatnonzero(np.abs(behind[:, axis]) > 0.999 * half)
+            turned = np.flatnonzero(np.diff(np.sign(behind[ends, axis])))
+            before, after = ends[turned], ends[turned + 1]
+            stands = np.abs(self.normals[(before + after) // 2, axis]) > ALONG_NORMAL
+            first, last = self.s[before[stands]], self.s[after[stands]]
+            found.append(np.column_stack([0.5 * (first + last), 0.5 * (last - first)]))
+        return np.concatenate(found)
 
     def _caps(self, crests: FloatArray) -> FloatArray:
         """(n,) heights of crests (K, 3), m."""
@@ -314,6 +349,28 @@ class _Profile:
             crests = self.fitted(half, crests)
             shapes.append(self._shape(half, crests))
         return [np.array([window.seen(shape) for shape in shapes]) for window in self.windows.values()]
+
+    def left_at(self, turns: FloatArray, halves: Sequence[float], noise: Noise, taken: Lag | None) -> FloatArray:
+        """(T, H) what half plays leave about turns of an axis (T, 2), squared and summed, in variances of the noise.
+
+        Those too near to an end, to a crest or to each other are left out.
+        """
+        from mapping.detection.path.backlash_kernels import hang_behind
+
+        spacing = self.heights.spacing
+        merge = max(1, round(2.0 * TURN_HALF_WIDTHS * float(np.median(turns[:, 1])) / (TURN_BINS * spacing)))
+        place, count = np.sort(turns[:, 0]), TURN_BINS * merge
+        first, reach = np.searchsorted(self.s, place) - count // 2, 0.5 * count * spacing
+        clear = (first >= 0) & (first + count <= len(self.s)) & (np.diff(place, prepend=-np.inf) >= 2.0 * reach)
+        clear &= (np.abs(place[:, None] - self.crests[:, 1]) > reach + self.crests[:, 2]).all(axis=1)
+        bins = first[clear, None] + np.arange(count)
+        root = _whitening(self.heights, TURN_BINS, merge, noise)
+        free = np.linalg.qr(root @ np.column_stack([np.ones(TURN_BINS), np.arange(float(TURN_BINS))]))[0]
+        root -= free @ (free.T @ root)
+        path, raw = self._level + self._caps(self.crests)[:, None] * self.normals, self._beside(taken)
+        left = [raw - np.einsum("ij,ij->i", hang_behind(path, half), self.normals) for half in halves]
+        means = np.array(left)[:, bins].reshape(len(halves), -1, TURN_BINS, merge).mean(axis=3)
+        return np.asarray(((means @ root.T) ** 2).sum(axis=2).T)
 
 
 def _profiles(laid: LaidTrace, crossings: Sequence[Crossing]) -> Iterator[_Profile]:
@@ -357,8 +414,7 @@ class _Window:
 
     def section(self) -> FloatArray:
         """(n, K) the height at its knots, whitened."""
-        knots = np.arange(-KNOT_REACH, KNOT_REACH + 0.5 * KNOT_STEP, KNOT_STEP)
-        hats = np.maximum(1.0 - np.abs(self._u[:, None] - knots) / KNOT_STEP, 0.0)
+        hats = np.maximum(1.0 - np.abs(self._u[:, None] - KNOTS) / KNOT_STEP, 0.0)
         return np.asarray(self.root @ (self.height * hats))
 
     def seen(self, shape: FloatArray) -> FloatArray:
@@ -380,19 +436,22 @@ class _Section:
     Args:
         windows: the crossings (W).
         seen: what is made of their heights (H, n) by no play and by each that is tried.
+        at_turns: (T, H) what these leave at turns of an axis, in variances of the noise.
     """
 
-    def __init__(self, windows: Sequence[_Window], seen: Sequence[FloatArray]) -> None:
+    def __init__(self, windows: Sequence[_Window], seen: Sequence[FloatArray], at_turns: FloatArray) -> None:
+        self._at_turns = at_turns
         self._left = [window.values - each for window, each in zip(windows, seen, strict=True)]
         self.columns = [window.section() for window in windows]
-        gram = np.sum([each.T @ each for each in self.columns], axis=0)
+        gram = sum((each.T @ each for each in self.columns), start=np.zeros((len(KNOTS), len(KNOTS))))
         unit = np.eye(len(gram))
         # of each standard deviation: covariance of the knots after the heights, and what that costs
         self.after = [sd**2 * np.linalg.inv(unit + sd**2 * gram) for sd in SECTION_SDS]
         self.cost = [-0.5 * float(np.linalg.slogdet(unit + sd**2 * gram)[1]) for sd in SECTION_SDS]
         # (S, H) log-likelihoods
-        tried = range(len(self._left[0]))
-        self._logs = np.array([[self._log_of([each[k] for each in self._left], sd) for k in tried] for sd in self._sds])
+        tried = range(at_turns.shape[1])
+        logs = np.array([[self._log_of([each[k] for each in self._left], sd) for k in tried] for sd in self._sds])
+        self._logs = logs - 0.5 * at_turns.sum(axis=0)
 
     @property
     def _sds(self) -> range:
@@ -408,18 +467,20 @@ class _Section:
         """Mean square that the play which fits best leaves over, in variances of the noise; at least 1."""
         over = float((-2.0 * (self._logs - np.array(self.cost)[:, None])).min())
         free = sum(each.shape[1] - WINDOW_FREEDOM for each in self._left)
+        free += len(self._at_turns) * (TURN_BINS - TURN_FREEDOM)
         return float(max(1.0, over / max(free, 1)))
 
     def gains_of_each(self) -> FloatArray:
-        """(W, H - 1) the same of every crossing alone, beside the section that all have without a play."""
+        """(W + T, H - 1) the same of every crossing alone, beside the section that all have without a play, and of
+        every turn."""
         none = [each[0] for each in self._left]
         common = self.after[int(np.argmax(self._logs[:, 0]))] @ self._moment(none)
         beside = [left - columns @ common for left, columns in zip(self._left, self.columns, strict=True)]
-        square = np.array([(left**2).sum(axis=1) for left in beside])
+        square = np.concatenate([*((left**2).sum(axis=1)[None] for left in beside), self._at_turns])
         return np.asarray(0.5 * (square[:, :1] - square[:, 1:]))
 
     def _moment(self, left: Sequence[FloatArray]) -> FloatArray:
-        return np.asarray(np.sum([each.T @ y for each, y in zip(self.columns, left, strict=True)], axis=0))
+        return sum((each.T @ y for each, y in zip(self.columns, left, strict=True)), start=np.zeros(len(KNOTS)))
 
     def _log_of(self, left: Sequence[FloatArray], k: int) -> float:
         moment = self._moment(left)
@@ -446,9 +507,7 @@ def _window(profile: _Profile, which: int, left: FloatArray, noise: Noise) -> _W
     inside = slice(int(first), int(first) + count * merge)
     u = (_merged(s[inside], merge) - place) / half_width
     under = (np.abs(u) < 1.0).astype(np.float64)
-    covariances = noise.block_covariances(count, merge * profile.heights.spacing, profile.heights.samples * merge)
-    lags = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    root = np.linalg.inv(np.linalg.cholesky(covariances[lags] + 1e-12 * covariances[0] * np.eye(count)))
+    root = _whitening(profile.heights, count, merge, noise)
     # height, place and half-width of the crest, and what the base may be off by
     slope = 2.0 * height * under / half_width
     free = np.column_stack([np.maximum(1.0 - u**2, 0.0), slope * u, slope * u**2, np.ones(count), u])
@@ -457,3 +516,10 @@ def _window(profile: _Profile, which: int, left: FloatArray, noise: Noise) -> _W
         return None  # a crest between two bins
     step = np.linalg.solve(triangle, basis.T @ root)[:3]
     return _Window(root - basis @ (basis.T @ root), step, _merged(left[inside], merge), crest, u, inside, merge)
+
+
+def _whitening(heights: SweepHeights, count: int, merge: int, noise: Noise) -> FloatArray:
+    """(count, count) inverse root of the covariance of so many blocks of a profile's bins."""
+    covariances = noise.block_covariances(count, merge * heights.spacing, heights.samples * merge)
+    lags = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariances[lags] + 1e-12 * covariances[0] * np.eye(count))))

@@ -78,6 +78,27 @@ def test_arclengths_and_heights_are_those_of_the_sweep_alone_and_are_kept(base):
     assert [sweep.heights(5e-4) for sweep in laid.laid_sweeps] and Counted.points == 0
 
 
+@pytest.mark.parametrize("known", [False, True])
+def test_heights_are_those_in_the_middle_of_bins_that_no_whole_number_of_steps_fits_into(known):
+    corners = np.array([[-0.05, -0.01, 0.0], [0.05, -0.01, 0.0], [0.05, 0.01, 0.0], [-0.05, 0.01, 0.0]])
+    plate = Base(Surface(corners, np.array([[0, 1, 2], [0, 2, 3]])))
+    x = np.arange(-0.02, 0.02, 40e-6)
+    crest = 1e-4 * np.exp(-0.5 * (x / 5e-4) ** 2)
+    centers = np.column_stack([x, 0.0 * x, TIP + crest])
+    laid = LaidTrace(Trace(np.arange(float(len(x))), centers, np.zeros(len(x), dtype=int), TIP), plate)
+    if known:
+        laid.feet()
+    (profile,) = laid.laid_sweeps[0].heights(5.3 * 40e-6)
+    at = x[0] + profile.s
+    assert np.abs(profile.centers[:, 0] - at)[1:-1].max() < 1e-12
+    # the mean over a bin is as much lower as the crest is bent: half its curvature times the variance within a bin
+    wide = 5e-4**2 + (5.3 * 40e-6) ** 2 / 12.0
+    mean = 1e-4 * 5e-4 / np.sqrt(wide) * np.exp(-0.5 * at**2 / wide)
+    # by the means of their samples, half a step beside, they would be 2.4 um off on the flanks
+    assert np.abs(profile.height - mean)[1:-1].max() < 0.2e-6
+    assert np.abs(profile.t - at / 40e-6 - 500.0)[1:-1].max() < 1e-6
+
+
 def test_means_over_one_plane_follow_from_the_feet_that_are_known(base):
     laid = LaidTrace(sweeps(), base)
     laid.feet()

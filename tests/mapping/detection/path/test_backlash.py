@@ -83,6 +83,40 @@ def test_where_the_axes_have_no_play_none_is_told(seed: int) -> None:
     assert asked(swept(0.0, seed=10 + seed, back=bool(seed % 2)))[2] is None
 
 
+def ring() -> Base:
+    """A round column of facets of a degree, 90 mm across."""
+    turn = np.radians(np.arange(360.0))
+    corners = np.array([[0.045 * np.cos(a), 0.045 * np.sin(a), z] for z in (-0.05, 0.05) for a in turn])
+    low, ahead = np.arange(360), np.roll(np.arange(360), -1)
+    sides = [np.stack([low, ahead, low + 360], 1), np.stack([ahead, ahead + 360, low + 360], 1)]
+    return Base(Surface(corners, np.concatenate(sides)))
+
+
+@pytest.mark.parametrize("play", [0.0, 20e-6])
+def test_where_a_path_round_a_body_turns_an_axis_its_play_is_told_without_a_crest(play: float) -> None:
+    rng, base = np.random.default_rng(7), ring()
+    turn = np.arange(0.3, 5.0, STEP / 0.05)
+    normals = np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    rows = [
+        played(0.05 * normals + [0.0, 0.0, 2e-3 * k], play) + NOISE * rng.standard_normal((len(turn), 1)) * normals
+        for k in range(SWEEPS)
+    ]
+    trace = Trace(
+        1e-3 * np.arange(SWEEPS * len(turn)), np.concatenate(rows), np.repeat(np.arange(SWEEPS), len(turn)), TIP
+    )
+    laid = LaidTrace.of(trace, base)
+    told = backlash(laid, detect(laid, base))
+    if not play:
+        assert told is None
+        return
+    assert told is not None and told.told and abs(told.play - play) < 3.0 * told.sd < 0.5 * play
+    off = (without_backlash(trace, told).centers - trace.centers) + np.concatenate(
+        [played(0.05 * normals, play) - 0.05 * normals] * SWEEPS
+    )
+    left = np.einsum("ij,ij->i", off, np.tile(normals, (SWEEPS, 1)))
+    assert left.std() < 0.15 * play
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_crests_that_are_steeper_on_one_side_are_no_play(seed: int) -> None:
     """One way they leave it in doubt; none is more probable, on trial too."""

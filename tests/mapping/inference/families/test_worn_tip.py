@@ -67,3 +67,6 @@ def test_evidence_tells_a_worn_ball_from_one_that_stands_too_low(worn: bool) -> 
     assert any("worn flat" in note for note in found.notes) == worn
     assert found.height.low < D < found.height.high
     assert found.height.high - found.height.low < 0.15 * D
+    # what a plateau is of, the flat or the crest, no section tells: a width under a worn ball is a bound
+    assert found.width.bounded == worn and found.width.censored == worn and (found.width.low == 0.0) == worn
+    assert found.width.high > D
