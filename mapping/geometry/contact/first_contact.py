@@ -16,6 +16,9 @@ from mapping.geometry.contact.query_order import morton_order
 from mapping.geometry.mesh import TriangleTree
 
 NONE, FACE, EDGE, VERTEX = 0, 1, 2, 3
+# Queries over details take longer than those over a flat part, and cores are lent to others: of two equal shares one
+# ends last. With eight each a thread waits for an eighth of its share at most
+PARTS_PER_THREAD = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,23 +165,20 @@ class BallContact:
             ContactError: wrong shapes, values that are not finite, an approach of length zero.
         """
         from mapping.geometry.contact import retreat_kernels
+        from mapping.geometry.mesh import QUERIES_PER_BLOCK
 
         commanded = checked_points(centers, "commanded centres")
         way = np.broadcast_to(unit_directions(approach, len(commanded)), commanded.shape)
         back = np.empty(len(commanded))
-        tree = self._tree
-        retreat_kernels.retreats(
-            tree.rows,
-            tree.leaves,
-            tree.boxes,
-            tree.links,
-            self._ball,
-            tree.size,
-            self._outward,
-            tree.into(commanded),
-            -way,
-            back,
-        )
+        tree, local, outward = self._tree, self._tree.into(commanded), self._outward
+
+        def some(part: slice) -> None:
+            retreat_kernels.retreats(
+                tree.rows, tree.leaves, tree.boxes, tree.links, self._ball, tree.size, outward,
+                local[part], -way[part], back[part],
+            )  # fmt: skip
+
+        _in_parts(some, len(commanded), QUERIES_PER_BLOCK, threads)
         back = tree.scale_out(back)
         rest = self.first_contact(commanded - back[:, None] * way, way, threads)
         return replace(rest, distance=rest.distance - back)
@@ -219,10 +219,11 @@ def _checked_radius(tip_radius: float) -> float:
 
 
 def _in_parts(work: Callable[[slice], None], count: int, block: int, threads: int) -> None:
-    """Do the work on slices of whole blocks, one for each thread."""
+    """Do the work on slices of whole blocks; each thread takes the next one when it is free."""
     if threads < 1:
         raise ContactError(f"threads must be at least 1; found {threads}")
-    size = max(-(-count // (block * threads)), 1) * block
+    most = 1 if threads == 1 else threads * PARTS_PER_THREAD
+    size = max(-(-count // (block * most)), 1) * block
     parts = [slice(first, min(first + size, count)) for first in range(0, count, size)]
     if len(parts) <= 1:
         for part in parts:

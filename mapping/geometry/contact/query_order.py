@@ -19,8 +19,8 @@ def morton_order(points: FloatArray) -> IntArray | None:
     """(N,) the points (N, 3) along a Morton curve (Morton 1966); None where they follow one another closely already."""
     if len(points) < 2:
         return None
-    low = points.min(axis=0)
-    extent = float((points.max(axis=0) - low).max())
+    low, high = (np.array([end(column) for column in points.T]) for end in (np.min, np.max))  # numpy is slow along rows
+    extent = float((high - low).max())
     steps = np.diff(points, axis=0)
     step = float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).mean())
     if not np.isfinite(extent) or step * np.sqrt(len(points)) <= IN_ROWS * extent:

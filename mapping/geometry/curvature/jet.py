@@ -28,6 +28,9 @@ BIAS_ALLOWANCE_SDS = 3.5
 # Weights fall with this power of the squared error: 1 averages most, large powers choose.
 WEIGHT_EXPONENT = 0.75
 SAMPLE = 3000
+# Ordinates are bent by what was found over planes, and then once more by what was found so. On spheres with noise the
+# second time halves the errors of the bend, and with them those of the widest fits; a third changes nothing.
+BENDING_SAMPLES = (1000, SAMPLE)
 # Of so many the share of the weight that falls to some sizes is known to 1.6 % (of shares between 0 and 1 the standard
 # deviation is half at most): a sixth of what may be lost
 WEIGHED_SAMPLE = 1000
@@ -46,11 +49,9 @@ PATCH_RINGS = 3
 TOLD_SIDE, GUESSED_SIDE = float(np.cos(1.0)), 0.0
 # Share of the residual that counts as noise even where all of it seems to be the polynomial's misfit.
 NOISE_FLOOR = 1e-3
-# Variance of a mean over what nested fits of white noise have: the weights follow the noise, too. And the share of the
-# misfit beyond the noise that is the curvature's own error, the rest being of higher terms. Over the cells of
-# `explore3d bench curvature` by jets alone with the seeds 1 and 5 the deviation of the coverage from 90 % is least and
-# flat (0.060 to 0.062) from 1.13 to 1.45 and at 0.46; of these the largest leaves the fewest cells below 84 % (6; 8).
-NOISE_SHARE, MISFIT_SHARE = 1.45, 0.46
+# Of the reaches the one over which the squared bias of the means is pooled. Over the first, 90 % intervals held 79 to
+# 83 % of the curvatures of a paraboloid of 2500 points (as above), over this one 87 to 92 %.
+ERROR_POOL = 1
 # Least share of the next size's residual that a jet with hardly more points than terms is credited with.
 LUCK = 1.0
 
@@ -92,9 +93,12 @@ def jets_and_noise(
         if neighbours is None
         else [neighbours]
     )
-    level = jets.noise() if noise is None else noise / size
+    level = noise / size if noise is not None else jets.noise()
     if neighbours is None:
-        jets.bend(sizes, level)
+        for count in BENDING_SAMPLES:
+            jets.bend(sizes, level, count)
+            # over a plane what is steep in a thin neighbourhood looks like noise
+            level = noise / size if noise is not None else jets.noise()
     if len(index) > LARGE_MESH_POINTS:
         sizes = jets.worthwhile(sizes, level)
     operators, slopes, error = jets.weighed(sizes, level, fixed=neighbours is not None)
@@ -146,8 +150,8 @@ class _Candidates:
             level[..., degree] = np.where(highest, np.fmax(noise, np.fmax(rests, bound)), noise)
         return self._times(level)
 
-    def part(self, chosen: IntArray) -> _Candidates:
-        """The candidates of some points."""
+    def part(self, chosen: slice) -> _Candidates:
+        """The candidates of a run of points."""
         return _Candidates(self.operators[chosen], self.factors[chosen], self.rests[chosen], self.slopes[chosen])
 
     def misfits(self, noise: float) -> FloatArray:
@@ -204,20 +208,21 @@ class _Jets:
         growth = (SMALL[1] / SMALL[0]) ** (self.degree + 1)
         return float(np.sqrt(max((growth * first - second) / (growth - 1), NOISE_FLOOR**2 * first)))
 
-    def bend(self, sizes: IntArray, noise: float) -> None:
-        """Bend all ordinates by the larger curvature at the nearest point of a sample, found without bending."""
+    def bend(self, sizes: IntArray, noise: float, count: int) -> None:
+        """Bend all ordinates by the larger curvature at the nearest point of a sample, found with the present bend."""
         from scipy.spatial import cKDTree
 
-        sample = self.sample()
+        sample = self.sample(count)
         found, tree = self.fit(sample, sizes), cKDTree(self.place[sample])
         pools = tree.query(self.place[sample], k=min(POOL, len(sample)))[1].reshape(len(sample), 1, -1)
         every, own = np.arange(len(sample)), found.deviations(noise)
-        weights, error = self._weights(found, own, every, pools, sizes, noise)
+        weights = self._weights(found, own, every, pools, sizes)
+        error = np.sqrt(_judged(weights, found, noise, sizes)[:, 0])
         a, b, c = np.einsum("msd,msdk->km", weights, np.nan_to_num(found.operators))
         # noise drives the two curvatures apart, and the larger of them too far: ordinates that are bent more than the
         # surface bias the widest fits
         mean, half2 = 0.5 * (a + c), 0.25 * (a - c) ** 2 + b**2
-        half = np.sqrt(np.maximum(half2 - 0.25 * error**2, 0.0))
+        half = np.sqrt(np.maximum(half2 - 0.75 * error**2, 0.0))
         larger = np.nan_to_num(np.where(mean < 0, mean - half, mean + half))
         boxed = BoxedPoints(self.place[sample])
         self.bends = larger[by_shares(lambda place: boxed.nearest(place)[1], self.place, NEAREST_COST)]
@@ -227,7 +232,7 @@ class _Jets:
         sample = self.sample(WEIGHED_SAMPLE)
         found = self.fit(sample, sizes)
         own, all_of_it = found.deviations(noise), np.arange(len(sample))
-        weights = self._weights(found, own, all_of_it, all_of_it[:, None, None], sizes, noise)[0].sum(axis=2)
+        weights = self._weights(found, own, all_of_it, all_of_it[:, None, None], sizes).sum(axis=2)
         reach = np.cumsum(weights[np.isfinite(weights).all(axis=1)].mean(axis=0))
         last = min(int(np.searchsorted(reach, 1 - LOST_WEIGHT_SHARE)), len(sizes) - 1)
         first = min(max(int(np.searchsorted(reach, LOST_WEIGHT_SHARE)) - 2, 0), last)
@@ -251,11 +256,12 @@ class _Jets:
                 pools[part, k] = np.minimum(near[:, spread], count - 1)
 
         def mean(part: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-            weights, error = self._weights(every, own, part, pools[part], sizes, noise)
+            fits = every.part(slice(part[0], part[-1] + 1))  # not copied
+            weights = self._weights(every, own, part, pools[part], sizes)
             return (
-                np.einsum("msd,msdk->mk", weights, np.nan_to_num(every.operators[part])),
-                np.einsum("msd,msdk->mk", weights, every.slopes[part]),
-                error,
+                np.einsum("msd,msdk->mk", weights, np.nan_to_num(fits.operators)),
+                np.einsum("msd,msdk->mk", weights, fits.slopes),
+                _judged(weights, fits, noise, sizes),
             )
 
         _in_threads(fill, parts)
@@ -263,13 +269,13 @@ class _Jets:
             return every.operators[:, 0, -1], every.slopes[:, 0, -1], every.misfits(noise)[:, 0, -1]
         own = every.deviations(noise)
         results = _in_threads(mean, parts)
-        operators, slopes, errors = (np.concatenate(values) for values in zip(*results, strict=True))
-        return operators, slopes, errors
+        operators, slopes, judged = (np.concatenate(values) for values in zip(*results, strict=True))
+        return operators, slopes, _errors(judged, pools[:, ERROR_POOL])
 
     def _weights(
-        self, every: _Candidates, own: FloatArray, part: IntArray, pools: IntArray, sizes: IntArray, noise: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """(M, S, D) weights, NaN where no candidate has a value, and (M,) errors of the weighed means."""
+        self, every: _Candidates, own: FloatArray, part: IntArray, pools: IntArray, sizes: IntArray
+    ) -> FloatArray:
+        """(M, S, D) weights, NaN where no candidate has a value."""
         from mapping.geometry.curvature.jet_kernels import pooled_bias
 
         bias = np.empty((len(part), *own.shape[1:]))
@@ -278,14 +284,7 @@ class _Jets:
         # where all agree to rounding, none is better than another
         trust = np.maximum(own[part] ** 2 + bias, np.finfo(float).tiny ** 0.25) ** -WEIGHT_EXPONENT
         total = trust.sum(axis=(1, 2))
-        weights = trust / np.where(total > 0, total, np.nan)[:, None, None]
-        known, chosen = np.isfinite(weights), every.part(part)
-        least, most = (
-            _variance(np.where(known, weights, 0.0), np.where(np.isfinite(deviations), deviations, 0.0) ** 2)
-            for deviations in (chosen.plain(noise), chosen.misfits(noise))
-        )
-        error = np.sqrt(NOISE_SHARE * least + MISFIT_SHARE * np.maximum(most - least, 0.0))
-        return weights, np.where(known.any(axis=(1, 2)), error, np.nan)
+        return np.asarray(trust / np.where(total > 0, total, np.nan)[:, None, None])
 
     def bases(self, slopes: FloatArray) -> FloatArray:
         """(N, 2, 3) orthonormal bases of the tangent planes with the given slopes in the normals' frames."""
@@ -300,13 +299,27 @@ class _Jets:
         return np.stack([t1, t2 / np.linalg.norm(t2, axis=1, keepdims=True)], axis=1)
 
 
-def _variance(weights: FloatArray, variances: FloatArray) -> FloatArray:
-    """(M,) variances of weighed means (M, S, D) of nested fits."""
-    from mapping.geometry.curvature.jet_kernels import variance_of_means
+def _judged(weights: FloatArray, fits: _Candidates, noise: float, sizes: IntArray) -> FloatArray:
+    """(M, 3) of `judged_means`, NaN where there is no mean."""
+    from mapping.geometry.curvature.jet_kernels import judged_means
 
-    out = np.empty(len(weights))
-    variance_of_means(weights.reshape(len(out), -1), variances.reshape(len(out), -1), out)
+    out = np.empty((len(weights), 3))
+    judged_means(np.nan_to_num(weights), fits.operators, fits.factors, fits.rests, noise, sizes, out)
+    out[np.isnan(weights).any(axis=(1, 2))] = np.nan
     return out
+
+
+def _errors(judged: FloatArray, pools: IntArray) -> FloatArray:
+    """(N,) errors of the means, of which `judged` (N, 3) is known, by the points (N, P) around each.
+
+    The bias of a mean is no more than one number at a place: its square is known from many. It grows with what the fits
+    leave over, and is pooled in proportion to that.
+    """
+    noise, excess, scale = judged.T
+    ratio = np.divide(excess, scale, out=np.full(len(scale), np.nan), where=scale > 0)[pools]
+    known = np.isfinite(ratio)
+    mean = np.where(known, ratio, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    return np.asarray(np.sqrt(noise + np.maximum(mean, 0.0) * scale))
 
 
 def _in_threads(work: Callable[[IntArray], Any], parts: list[IntArray]) -> list[Any]:

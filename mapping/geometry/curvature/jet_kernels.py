@@ -17,6 +17,8 @@ CERTAIN_GAP = 12.5
 
 # Numbers of 8 bytes that one instruction of 32 bytes takes at once: new rows are filled up with zeros to a multiple
 FILLED_UP_TO = 4
+# Sizes apart of two fits that judge each other's bias: about twice as many points
+JUDGE_STEPS = 2
 LEAST_SQUARED_ERROR = 1e-28  # squared error of a curvature that is never undercut, for bodies of about unit size
 
 
@@ -422,24 +424,79 @@ def _disagreement(variances, parts, s, d, other, higher):  # type: ignore[no-unt
 
 
 @njit(cache=True, nogil=True)
-def variance_of_means(weights, variances, out):  # type: ignore[no-untyped-def]
-    """Variance of a weighed mean of nested fits.
+def judged_means(weights, operators, factors, rests, noise, sizes, out):  # type: ignore[no-untyped-def]
+    """Variance of weighed means of nested fits, and what their bias is judged by (theory equations 9.4 and 9.4a).
 
-    The fits share their points: the more exact of two nested least-squares fits is the better one with less of the
-    other's noise in it, and their covariance is its variance (Hausman; theory equation 9.4). So this is the sum over
-    all pairs of w_i w_j min(v_i, v_j).
+    A fit of degree d is biased as its reach to the power d, so as its size n to d/2: of its difference from the fit
+    over m points, 1/((m/n)^(d/2) - 1) is its own bias. The judge is wider where there is one, which has less noise; a
+    fit without any is trusted no better than what it leaves over.
 
     Args:
-        weights: (M, K) of the mean.
-        variances: (M, K), finite wherever the weight is not zero.
-        out: (M,) written.
+        weights: (M, S, D) of the means, none where a fit is not determined.
+        operators, factors, rests: of `fit_jets` at the M points.
+        noise: standard deviation of the points.
+        sizes: (S,) neighbourhood sizes.
+        out: (M, 3) written: variance by the noise; squared Frobenius norm of the estimated bias less what noise adds to
+            it; what noise of the size of the residuals would add.
     """
+    count, options = len(sizes), weights.shape[2]
+    own, bias = np.empty(count * options), np.empty(count * options)
+    level, rest = np.empty(count * options), np.empty(count * options)
     for m in range(len(weights)):
-        order = np.argsort(variances[m])
-        behind, total = 0.0, 0.0
-        for i in range(len(order) - 1, -1, -1):
-            w = weights[m, order[i]]
-            if w > 0.0:
-                total += w * variances[m, order[i]] * (w + 2.0 * behind)
-                behind += w
-        out[m] = total
+        bias[:] = 0.0
+        level[:] = 0.0
+        rest[:] = 0.0
+        a, b, c = 0.0, 0.0, 0.0
+        for s in range(count):
+            for d in range(options):
+                i = s * options + d
+                own[i] = weights[m, s, d]
+                if np.isfinite(factors[m, s, d]):
+                    level[i] = (noise * factors[m, s, d]) ** 2
+                    rest[i] = (max(noise, rests[m, s, d]) * factors[m, s, d]) ** 2
+        for s in range(count):
+            for d in range(options):
+                if not weights[m, s, d] > 0.0:
+                    continue
+                t = _judge(factors[m, :, d], s)
+                if t == s:
+                    level[s * options + d] = rest[s * options + d]
+                    continue
+                share = weights[m, s, d] / ((sizes[t] / sizes[s]) ** (d + 1) - 1.0)
+                a += share * (operators[m, t, d, 0] - operators[m, s, d, 0])
+                b += share * (operators[m, t, d, 1] - operators[m, s, d, 1])
+                c += share * (operators[m, t, d, 2] - operators[m, s, d, 2])
+                bias[t * options + d] += share
+                bias[s * options + d] -= share
+        out[m, 0] = _nested_variance(own, level)
+        out[m, 1] = a * a + 2.0 * b * b + c * c - _nested_variance(bias, level)
+        out[m, 2] = _nested_variance(bias, rest)
+
+
+@njit(cache=True)
+def _judge(factors, s):  # type: ignore[no-untyped-def]
+    """The size by which the fit over size s is judged: up to two sizes wider, else up to two narrower, else s."""
+    for t in range(min(s + JUDGE_STEPS, len(factors) - 1), s, -1):
+        if np.isfinite(factors[t]):
+            return t
+    for t in range(max(s - JUDGE_STEPS, 0), s):
+        if np.isfinite(factors[t]):
+            return t
+    return s
+
+
+@njit(cache=True)
+def _nested_variance(shares, variances):  # type: ignore[no-untyped-def]
+    """Variance of a sum of nested fits (K,), each times its share of either sign.
+
+    The fits share their points: the more exact of two nested least-squares fits is the better one with less of the
+    other's noise in it, and their covariance is its variance (Hausman). So this is the sum over all pairs of
+    c_i c_j min(v_i, v_j).
+    """
+    order = np.argsort(variances)
+    behind, total = 0.0, 0.0
+    for k in range(len(order) - 1, -1, -1):
+        i = order[k]
+        total += shares[i] * variances[i] * (shares[i] + 2.0 * behind)
+        behind += shares[i]
+    return total

@@ -122,11 +122,11 @@ def test_a_million_metres_from_the_origin_cost_only_their_rounding():
     far = principal_curvatures(Surface(surface.vertices + np.array([1e6, -1e6, 1e6]), surface.faces))
     inside = (np.abs(surface.vertices[:, :2]) < 0.7).all(axis=1)
     near = principal_curvatures(surface)
-    # without noise rounding decides between fits that err by 2e-6: near as far it may choose any of them, no worse one
+    # without noise rounding decides between jets that err by 2e-6 and fits of libigl's that err by 2e-5 where the jets
+    # state more: near as far it may choose any of them, no worse one
     exact = -((1.0 + surface.vertices[inside, 0] ** 2) ** -1.5)
-    own = np.abs(near.k2[inside] - exact).max()
-    assert own < 5e-6
-    np.testing.assert_allclose(far.k2[inside], near.k2[inside], atol=own)
+    for found in (near, far):
+        np.testing.assert_allclose(found.k2[inside], exact, rtol=0, atol=3e-5)
 
 
 def test_noise_widens_the_neighbourhood_and_the_standard_deviation_is_honest():
@@ -163,7 +163,8 @@ def test_the_widest_fits_of_a_paraboloid_are_not_taken_for_unbiased():
     radius2 = (surface.vertices[inside, :2] ** 2).sum(axis=1)
     along, around = 0.5 / (1 + 0.25 * radius2) ** 1.5, 0.5 / np.sqrt(1 + 0.25 * radius2)
     error = np.abs(np.stack([curvature.k1[inside] - around, curvature.k2[inside] - along]))
-    assert (error < 1.645 * curvature.sd[inside]).mean() > 0.63  # 0.54 by pools of the nearest 60 points alone
+    # 0.79 by pools of the nearest 60 points, 0.62 if fits of the next degree were judges
+    assert 0.87 < (error < 1.645 * curvature.sd[inside]).mean() < 0.95
 
 
 def test_a_sphere_has_curvature_but_no_principal_directions():
