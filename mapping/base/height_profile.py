@@ -149,14 +149,15 @@ def height_profiles(
     first = np.flatnonzero(np.diff(bins, prepend=-1) > 0)
     occupied = bins[first]
     counts = np.diff(np.append(first, len(s)))
-    place = (np.add.reduceat(s, first) / counts - s[0] + 0.5 * step) / spacing - 0.5
-    centers = _at_middles(np.add.reduceat(trace.centers, first, axis=0) / counts[:, None], occupied, place)
-    times = _at_middles(np.add.reduceat(trace.t, first) / counts, occupied, place)
+    centers = np.add.reduceat(trace.centers, first, axis=0) / counts[:, None]
+    times = np.add.reduceat(trace.t, first) / counts
     under = up = None
-    if counts.mean() < FEW_SAMPLES_PER_BIN:
+    if counts.mean() < FEW_SAMPLES_PER_BIN:  # a step is a good part of a bin, over which a scratch is not straight
         laid = base.foot(trace.centers, trace.tip_radius) if feet is None else feet()
-        height = _at_middles(np.add.reduceat(laid.height, first) / counts, occupied, place)
+        height = np.add.reduceat(laid.height, first) / counts
     else:
+        place = (np.add.reduceat(s, first) / counts - s[0] + 0.5 * step) / spacing - 0.5
+        centers, times = (_at_middles(each, occupied, place) for each in (centers, times))
         under, up, height = (means or _laid_on(base, trace.tip_radius))(centers, first, len(s))
     longest = max(LONGEST_BIN_GAP, int(NARROW * trace.tip_radius / spacing))
     cuts = np.flatnonzero(np.diff(occupied) > longest + 1) + 1
