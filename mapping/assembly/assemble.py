@@ -85,7 +85,7 @@ def assemble(
         if wide and spacing is not None:
             looked = inspections.at(spacing)
             beside = _linked(replace(detections, crossings=crossings), laid, looked)
-            lost = outweighed([*wide, *beside], _linked(detections, laid, looked), looked, laid.tip_radius)[: len(wide)]
+            lost = outweighed(wide, beside, _linked(detections, laid, looked), looked, laid.tip_radius)
             if any(lost):
                 wide = [feature for feature, out in zip(wide, lost, strict=True) if not out]
                 crossings = tuple(c for c in detections.crossings if not any(lies_on(c, feature) for feature in wide))

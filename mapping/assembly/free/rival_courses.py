@@ -24,31 +24,34 @@ PLACED_BY_SPOT, PLACED_BY_LINE = 2, 5
 
 
 def outweighed(
-    features: Sequence[Feature], rivals: Sequence[Feature], inspection: Inspection, tip: float
+    wide: Sequence[Feature], beside: Sequence[Feature], rivals: Sequence[Feature], inspection: Inspection, tip: float
 ) -> list[bool]:
-    """Of each feature whether the rivals that are felt where it is have other courses, and likelier ones.
+    """Of each wide feature whether the rivals that are felt where it is have other courses, and likelier ones.
 
     Args:
-        features, rivals: two accounts of what was detected; what both hold alike may be in both.
+        wide: what sections are of.
+        beside: what else was detected, if these are right.
+        rivals: all that was detected, if they are not.
         inspection: heights of all sweeps.
         tip: radius, m.
     """
-    lost = [False] * len(features)
+    features, lost = [*wide, *beside], [False] * len(wide)
     for group in _felt_together([*features, *rivals], tip):
-        own = [k for k in group if k < len(features)]
-        ours, theirs = [features[k] for k in own], [rivals[k - len(features)] for k in group if k >= len(features)]
-        if not ours or not theirs or _alike(ours, theirs, inspection.pitch):
+        asked = [k for k in group if k < len(wide)]
+        ours = [features[k] for k in group if k < len(features)]
+        theirs = [rivals[k - len(features)] for k in group if k >= len(features)]
+        if not asked or not theirs:
             continue
-        if _log_ratio(theirs, ours, inspection, tip) > 0.0:
-            for k in own:
+        width = max(wide[k].width.median for k in asked)
+        if not _alike(ours, theirs, width, inspection.pitch) and _log_ratio(theirs, ours, inspection, tip) > 0.0:
+            for k in asked:
                 lost[k] = True
     return lost
 
 
-def _alike(features: Sequence[Feature], rivals: Sequence[Feature], pitch: float) -> bool:
-    """True of the same courses, each within the core of what lies on it, and ending where the next sweep may tell it:
-    how wide that is, its sections say."""
-    width = max(feature.width.median for feature in features)
+def _alike(features: Sequence[Feature], rivals: Sequence[Feature], width: float, pitch: float) -> bool:
+    """True of the same courses, each within the core of what is so wide (m), and ending where the next sweep may tell
+    it: how wide that is, its sections say."""
     pairs = ((features, rivals), (rivals, features))
     return all(_runs_along(each, others, CORE * width, 0.5 * width + pitch) for some, others in pairs for each in some)
 

@@ -9,9 +9,9 @@ from mapping import FloatArray
 # Two half circles that meet in an S lie off their best polynomials by 4.7 % of their radius at degree 8, by 0.9 % at
 # 16; a course takes a degree only where it pays for itself
 HIGHEST_DEGREE = 16
-# Through N places at even distances a polynomial of a degree beyond 2 sqrt(N) swings between them and flies off at the
-# ends (Dahlquist and Bjorck, Numerical Methods, 1974). Of few places that allows less than what was
-# always tried there: 8
+# Errors of N places at even distances come out up to 2.6 to 3.5 times as large between them through a polynomial of
+# degree 2 sqrt(N), N from 16 to 64, but 14 times at 3 sqrt(N), and 123 times at N - 2 of 16 (sums of the weights of all
+# places, the largest over the stretch). Of few places that allows less than 8, which may be tried of any
 STABLE_SHARE, ALWAYS_TRIED = 2.0, 8
 # A fit whose typical square residual exceeds this many variances follows the axis at no degree: the axis is kept.
 POOR = 9.0

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from mapping import FloatArray, Trace
+from mapping import Feature, FloatArray, Interval, Support, Trace
 from mapping.assembly import assemble
+from mapping.assembly.free import outweighed
+from mapping.assembly.linking import Inspection
 from mapping.base import fit_base
 from mapping.detection import detect
 
@@ -52,3 +54,29 @@ def test_the_strokes_of_a_letter_are_three_ridges() -> None:
     found = assemble(detect(trace, base), trace, base)
     assert [feature.kind for feature in found] == ["ridge"] * 3
     assert max(feature.width.median for feature in found) < 2.0 * WIRE
+
+
+def test_a_step_somewhere_else_is_not_asked_what_a_wide_bump_is() -> None:
+    """A step has no width of its own."""
+    places = np.column_stack([np.linspace(-40e-3, 40e-3, 400), np.zeros((400, 2))])
+    looked = Inspection(
+        places, np.zeros(400), np.ones(400), np.arange(400) % 5, 0.2e-3, samples=np.ones(400, dtype=int)
+    )
+    wide = feature("bump", [[-30e-3, 0.0, 0.0]], height=1e-3, width=8e-3)
+    step = feature("step", [[30e-3, -5e-3, 0.0], [30e-3, 5e-3, 0.0]], height=1e-3, width=0.0)
+    assert outweighed([wide], [step], [wide, step], looked, TIP) == [False]
+
+
+def feature(kind: str, axis: list[list[float]], height: float, width: float) -> Feature:
+    line = np.linalg.norm(np.ptp(axis, axis=0))
+    return Feature(
+        kind=kind,
+        axis=np.array(axis),
+        normals=np.tile([0.0, 0.0, 1.0], (len(axis), 1)),
+        height=Interval(height, height, height),
+        width=Interval(width, width, width),
+        length=Interval(line, line, line),
+        evidence=Support(50.0, 5),
+        curvature_feature=False,
+        position_sd=1e-4,
+    )
