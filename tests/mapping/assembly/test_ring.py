@@ -9,6 +9,7 @@ from mapping import Trace
 from mapping.assembly import assemble
 from mapping.base import fit_base
 from mapping.detection import detect
+from mapping.inference.joint import refine_all
 
 TIP, RADIUS, WIDTH, DEPTH, WHITE = 1e-3, 8e-3, 1.2e-3, 0.15e-3, 3e-6
 
@@ -23,8 +24,11 @@ def test_a_groove_all_round_is_one_closed_groove() -> None:
     sweep = np.repeat(np.arange(len(y)), len(x))
     trace = Trace(1e-2 * np.arange(len(feet)), np.column_stack([feet, TIP + height]), sweep, TIP)
     base = fit_base(trace)
-    (ring,) = assemble(detect(trace, base), trace, base)
+    detections = detect(trace, base)
+    (ring,) = assemble(detections, trace, base)
     assert ring.kind == "groove" and ring.closed
     assert ring.length.median == pytest.approx(2.0 * np.pi * RADIUS, rel=2e-3)
-    assert ring.width.low - 0.1e-3 < WIDTH < ring.width.high + 0.1e-3
-    assert np.abs(np.hypot(ring.axis[:, 0] - 0.3e-3, ring.axis[:, 1] + 0.2e-3) - RADIUS).max() < 60e-6  # as assembled
+    (told,) = refine_all((ring,), trace, 1, base=base, noise=detections.noise, confirm=None)
+    assert told.width.low < WIDTH < told.width.high  # which section it has, the posterior weighs
+    assert told.height.low < -DEPTH < told.height.high
+    assert np.abs(np.hypot(told.axis[:, 0] - 0.3e-3, told.axis[:, 1] + 0.2e-3) - RADIUS).max() < 10e-6
