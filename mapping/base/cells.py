@@ -15,7 +15,7 @@ class Cells:
     """Means over consecutive samples of one sweep.
 
     Args:
-        centers: (C, 3) mean ball centres in the order of time, m.
+        centers: (C, 3) ball centres amid the cells, in the order of time, m.
         sweep: (C,) sweep of each.
         normals: (C, 3) mean contact normals, or None.
         cell: (N,) number of the cell of each sample.
@@ -38,7 +38,7 @@ class Cells:
         lengths = np.diff(np.append(starts, len(trace)))
         cell, counts = np.empty(len(trace), dtype=np.int64), lengths[:, None]
         cell[order] = np.repeat(np.arange(len(starts)), lengths)
-        centers = np.add.reduceat(trace.centers, starts) / counts
+        centers = _on_the_path(np.add.reduceat(trace.centers, starts) / counts, lengths, sweep[starts])
         normals = None if trace.normals is None else np.add.reduceat(trace.normals, starts) / counts
         return cls(centers, sweep[starts], normals, cell)
 
@@ -46,6 +46,32 @@ class Cells:
         """Some of the cells as a trace of their own; their times count cells."""
         normals = None if self.normals is None else self.normals[keep]
         return Trace(np.flatnonzero(keep).astype(np.float64), self.centers[keep], self.sweep[keep], tip_radius, normals)
+
+
+def _on_the_path(means: FloatArray, samples: IntArray, sweep: IntArray) -> FloatArray:
+    """(C, 3) places on the path amid cells of so many samples (C,), from their means (C, 3).
+
+    The mean of n samples on a bend lies inside it, by (n^2 - 1) / 24 of the path's second derivative by the samples'
+    number: 0.34 um for cells of 0.43 mm on a circle of 23 mm, by which a cylinder's radius would be too small and every
+    height over it too large. The derivative is that of the parabola through a cell's mean and its neighbours', or one
+    of theirs if that is less: a straight path stays straight beside an edge that the ball rolls round. Noise that this
+    adds is of short waves alone, which no fit to many cells follows.
+    """
+    if len(means) < 3 or samples.max() == 1:
+        return means
+    place = np.cumsum(samples) - 0.5 * samples
+    rise = np.diff(means, axis=0) / np.diff(place)[:, None]
+    second = np.full_like(means, np.inf)
+    second[1:-1] = 2.0 * np.diff(rise, axis=0) / (place[2:] - place[:-2])[:, None]
+    second[1:-1][sweep[2:] != sweep[:-2]] = np.inf
+    size = np.linalg.norm(second, axis=1)
+    beside = np.clip(np.arange(len(means))[:, None] + [-1, 0, 1], 0, len(means) - 1)
+    of_sweep = np.where(sweep[beside] == sweep[:, None], size[beside], np.inf)
+    chosen = np.take_along_axis(beside, of_sweep.argmin(axis=1)[:, None], axis=1)[:, 0]
+    known = np.isfinite(of_sweep.min(axis=1))
+    moved = means.copy()
+    moved[known] -= ((samples[known] ** 2 - 1.0) / 24.0)[:, None] * second[chosen[known]]
+    return moved
 
 
 def rows_of(points: FloatArray, height: FloatArray, sweep: IntArray, samples: float = 1.0) -> list[Row]:
