@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -38,7 +39,7 @@ class SweepHeights:
         start: arclength of the first bin's middle, m.
         spacing: width of the bins, m.
         height: (n,) mean height over the base in each bin, m.
-        samples: samples per bin on average.
+        samples: samples per bin: white noise has one so many-th of its variance in the mean of all bins.
         first: (n + 1,) index within the sweep of the first sample of each bin.
         t: (n,) mean times, s.
         centers: (n, 3) mean ball centres, m. Like heights and times they are those at the bins' middles.
@@ -61,6 +62,11 @@ class SweepHeights:
     def s(self) -> FloatArray:
         """(n,) arclength of the bins' middles, m."""
         return self.start + self.spacing * np.arange(len(self.height), dtype=np.float64)
+
+    @cached_property
+    def white_variance(self) -> FloatArray:
+        """(n,) of white noise in each bin, over that of single samples, as what spans several bins sees it."""
+        return _white_variance(np.diff(self.first))
 
     @property
     def length(self) -> float:
@@ -176,7 +182,7 @@ def height_profiles(
                 float(s[0] + (wanted[0] + 0.5) * spacing - 0.5 * step),
                 spacing,
                 np.interp(wanted, have, height[begin:end]),
-                float(counts[begin:end].mean()),
+                float(1.0 / _white_variance(np.diff(edges)).mean()),
                 edges,
                 np.interp(wanted, have, times[begin:end]),
                 middles,
@@ -184,6 +190,20 @@ def height_profiles(
             )
         )
     return tuple(profiles)
+
+
+def _white_variance(counts: IntArray) -> FloatArray:
+    """(n,) variance of white noise in bins of so many samples (n,), over that of one sample, as long waves see it.
+
+    A bin of n samples has one n-th. One without any lies on the line between those beside it, whose samples stand for
+    it as well: where those of one bin stand for w bins, each of these has w / n.
+    """
+    occupied = np.flatnonzero(counts)
+    stands_for = np.ones(len(occupied))
+    empty = np.diff(occupied) - 1
+    stands_for[:-1] += 0.5 * empty
+    stands_for[1:] += 0.5 * empty
+    return np.interp(np.arange(len(counts)), occupied, stands_for / counts[occupied])
 
 
 def _at_middles(means: FloatArray, occupied: IntArray, place: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray
 from mapping.base import SweepHeights
 from mapping.detection.cap_fit import PHYSICAL, Disturbance, fit_cap
-from mapping.detection.empirical_null import NullScale
+from mapping.detection.empirical_null import NullScale, sampling, seen
 from mapping.detection.filters import Bank
 from mapping.instrument import Noise, running_mean
 
@@ -35,8 +35,6 @@ MOST_DISTURBANCE_ROUNDS = 50
 # Thresholds above which a stretch is no noise whatever the law. What is weaker is left in the measurement of the
 # noise: a law wrong by a factor of two or three makes many of these, and a median hardly sees a few features.
 CLEAR = 3.0
-# Samples are scarce where the noise's variance is raised by more than this share: less is the binning's own.
-SCARCE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,39 +208,23 @@ def _stretches(
             height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
 
 
-def _scarcity(profile: SweepHeights, bank: Bank) -> FloatArray:
-    """(n,) share by which the noise's variance in a bin exceeds the average for want of samples; 0 if none does."""
-    counts = np.maximum(np.diff(profile.first), 1)
-    white = bank.noise.white**2 / bank.samples
-    share = white / max(white + bank.noise.correlated_sd**2, np.finfo(float).tiny)
-    return np.asarray(share * (bank.samples / counts - 1.0))
-
-
 def _certainties(profile: SweepHeights, bank: Bank, null: NullScale | None) -> FloatArray | None:
     """(F, n) expected over actual sd of what each filter that fits sees in each bin; None where it is 1 throughout."""
-    scarcity = _scarcity(profile, bank)
-    scarce = scarcity.max(initial=0.0) > SCARCE
-    if not scarce and null is None:
+    sampled = sampling(profile, bank) if null is None else None
+    if sampled is None and null is None:
         return None
     out = np.ones((len(bank.filters), len(profile.height)))
     for k in range(bank.fitting(len(profile.height), _longest(profile.height, bank))):
-        if scarce and (share := _certainty(scarcity, int(bank.filters[k].half_width / bank.spacing))) is not None:
-            out[k] = share
         if null is not None:
             out[k] /= null.along(k)
+        elif sampled is not None:
+            out[k] /= seen(sampled, bank.filters[k].half_width / bank.spacing)
     return out
 
 
 def _longest(height: FloatArray, bank: Bank) -> float:
     """Half-width of the widest disturbance that is sought in a profile of heights (n,), m."""
     return LARGEST_SHARE * len(height) * bank.spacing
-
-
-def _certainty(scarcity: FloatArray, bins: int) -> FloatArray | None:
-    raised = running_mean(scarcity, max(1, bins))
-    if raised.max() <= SCARCE:
-        return None
-    return np.asarray(1 / np.sqrt(1 + np.where(raised > SCARCE, raised, 0.0)))
 
 
 def _candidates(

@@ -229,12 +229,13 @@ def _detected(trace: Trace, laid: LaidTrace, asked: _Asked, of_each: Noise | Non
         # where all that is kept must stand out of the rounding of the positions, the law of what is less than that
         # decides nothing; and it is no law: a level path rounds to one value, a steep one to another at each sample
         if measured > rounding:
-            remarks = (_raised(measured, found_from, base),) if told else ()
+            as_fitted = all(null.as_fitted for null in told)
+            remarks = () if as_fitted else (_raised(measured, found_from, base),)
             # over a base that was fitted to one profile, small features and roughness are the same thing: what
             # speaks against the law is said, and decides nothing (see _stands_out)
             if base.kind != "profile":
                 found = weighed
-                if told:
+                if not as_fitted:
                     doubt *= told[0].doubt_at(float(np.sqrt(2 * tip * measured)))
                     level = floored(effective_noise(bank, told), tip)
                     level = replace(level, levels=_levels(profiles, nulls, told, measured, tip))
@@ -356,7 +357,7 @@ def _weighed(
     thresholds: dict[float, float],
     tip: float,
 ) -> tuple[list[Searched], list[NullScale | None]]:
-    """What is found under the scale of the quiet path, and that scale; None where it is the fitted one.
+    """What is found under the scale of the quiet path, and that scale; None where it is the fitted one throughout.
 
     What is found is left out of the scale, and the scale decides what is found: from the fitted scale upwards, until
     nothing changes. The least scale that explains what it calls quiet is the answer: features never enter it.
@@ -379,6 +380,9 @@ def _weighed(
             # what is found, but not clear, stays out of the tails: they tell of noise that is nowhere found
             tails = scales[0].tails
             if all(scale.as_fitted for scale in scales):
+                for i, scale in zip(numbers, scales, strict=True):
+                    if not scale.sampled_alike:
+                        nulls[i], found[i] = scale, search(profiles[i], bank, noise, threshold, tip, scale)
                 break
             for i, scale in zip(numbers, scales, strict=True):
                 nulls[i], found[i] = scale, search(profiles[i], bank, noise, threshold, tip, scale)

@@ -43,6 +43,9 @@ PLACES_A_PROFILE, LOUDNESS_GROUPS = 64, 20
 CERTAIN = 1.6448536
 # Correlation lengths among which that of the effective noise is chosen: a quarter of an octave apart or less.
 CORRELATION_LENGTHS = 40
+# Samples come unevenly where the variance that the narrowest filter sees differs by more than this share: less is the
+# binning's own.
+ALIKE_SAMPLED = 0.1
 # Share of a filter's width from which features may have been taken out: its output loses that share of its variance.
 MISSING_SHARE = 0.1
 # Core standard deviations between which outputs are counted, and Student's degrees of freedom among which those of
@@ -58,7 +61,8 @@ class NullScale:
     Args:
         pooled: (F,) for each filter of the bank, over all sweeps.
         own: (F, C) by which this profile's cells differ from that.
-        local: (n,) variance of the bins over the fitted one.
+        sampled: (n,) variance of the bins over the fitted one for how many samples they have.
+        local: (n,) variance of the bins over that.
         doubt: (F,) by which a Gaussian threshold must rise for these being uncertain, and for heavier tails.
         tails: (F,) by which it must rise for the tails alone.
         spacing: width of a profile bin, m.
@@ -68,6 +72,7 @@ class NullScale:
 
     pooled: FloatArray
     own: FloatArray
+    sampled: FloatArray
     local: FloatArray
     doubt: FloatArray
     tails: FloatArray
@@ -77,8 +82,13 @@ class NullScale:
 
     @property
     def as_fitted(self) -> bool:
-        """True if the outputs scatter as the fitted noise says, everywhere."""
+        """True if the outputs scatter as the fitted noise says of so many samples, everywhere."""
         return all(bool((each == 1.0).all()) for each in (self.pooled, self.own, self.local, self.doubt))
+
+    @property
+    def sampled_alike(self) -> bool:
+        """True if all bins have as many samples, or nearly."""
+        return bool((self.sampled == 1.0).all())
 
     @cached_property
     def _middles(self) -> FloatArray:
@@ -86,15 +96,15 @@ class NullScale:
         return np.asarray((np.arange(cells) + 0.5) * len(self.local) / cells)
 
     def level(self, k: int) -> FloatArray:
-        """(n,) of the k-th filter in each bin, as it is likeliest."""
+        """(n,) of the k-th filter in each bin, as it is likeliest, were all bins sampled alike."""
         own = np.full(len(self.local), self.pooled[k] * self.own[k, 0])
         if self.own.shape[1] > 1:
             own = self.pooled[k] * np.exp(np.interp(np.arange(len(own)), self._middles, np.log(self.own[k])))
-        return np.asarray(np.maximum(own * _seen(self.local, self.widths[k] / self.spacing), self.least[k]))
+        return np.asarray(np.maximum(own * seen(self.local, self.widths[k] / self.spacing), self.least[k]))
 
     def along(self, k: int) -> FloatArray:
-        """(n,) of the k-th filter in each bin, doubt included: what the threshold is a multiple of."""
-        return np.asarray(self.doubt[k] * self.level(k))
+        """(n,) of the k-th filter in each bin, doubt and sampling included: what the threshold is a multiple of."""
+        return np.asarray(self.doubt[k] * self.level(k) * seen(self.sampled, self.widths[k] / self.spacing))
 
     def at(self, half_width: float, place: float) -> float:
         """Of the filter nearest to a half-width, m, at a bin."""
@@ -136,15 +146,18 @@ def null_scales(
         that (Schwarz 1978).
     """
     widths = np.array([f.half_width for f in bank.filters])
-    levels = local_levels(heights, quiet, bank)
+    levels = local_levels(profiles, heights, quiet, bank)
     local = levels.variance
+    told_of = [sampling(p, bank) for p in profiles]
+    sampled = [np.ones(len(h)) if told is None else told for h, told in zip(heights, told_of, strict=True)]
+    both = [one * other for one, other in zip(local, sampled, strict=True)]
     least = np.array([_output_variance(bank, k, Noise(rounding)) / f.sd**2 for k, f in enumerate(bank.filters)]) ** 0.5
     pooled, doubt, heavier = (np.ones(len(widths)) for _ in range(3))
     own = [np.ones((len(widths), _cells(p, widths[0]))) for p in profiles]
     inherited, variance = [np.zeros(each.shape[1]) for each in own], 0.0
     measured = [*range(0, len(widths), STRIDE)]
     for k in measured:
-        outputs = [_outputs(h, q, v, bank, k, float(least[k])) for h, q, v in zip(heights, quiet, local, strict=True)]
+        outputs = [_outputs(h, q, v, bank, k, float(least[k])) for h, q, v in zip(heights, quiet, both, strict=True)]
         together = np.concatenate([each[np.isfinite(each)] for each in outputs])
         length = len(together) * bank.filters[k].coarse * bank.spacing
         if length < CELL_WIDTHS * widths[k]:
@@ -177,8 +190,8 @@ def null_scales(
     pooled, doubt, heavier = (_between(each, measured) for each in (pooled, doubt, heavier))
     own = [_between(each, measured) for each in own]
     return [
-        NullScale(pooled, each, v, doubt, heavier, bank.spacing, widths, least)
-        for each, v in zip(own, local, strict=True)
+        NullScale(pooled, each, known, v, doubt, heavier, bank.spacing, widths, least)
+        for each, known, v in zip(own, sampled, local, strict=True)
     ]
 
 
@@ -275,7 +288,16 @@ def _cells(profile: SweepHeights, width: float) -> int:
     return max(1, int(profile.length / (CELL_WIDTHS * width)))
 
 
-def _seen(local: FloatArray, bins: float) -> FloatArray:
+def sampling(profile: SweepHeights, bank: Bank) -> FloatArray | None:
+    """(n,) variance of the bins' noise over the bank's for how many samples each has; None where they come evenly."""
+    white = bank.noise.white**2 / bank.samples
+    share = white / max(white + bank.noise.correlated_sd**2, np.finfo(float).tiny)
+    variance = 1.0 + share * (bank.samples * profile.white_variance - 1.0)
+    narrowest = seen(variance, bank.filters[0].half_width / bank.spacing)
+    return variance if np.abs(narrowest**2 - 1.0).max() > ALIKE_SAMPLED else None
+
+
+def seen(local: FloatArray, bins: float) -> FloatArray:
     """(n,) by which the sd of a filter of so many bins' half-width differs where bins have these variances (n,)."""
     if (local == local[0]).all():
         return np.full(len(local), np.sqrt(local[0]))
@@ -290,7 +312,7 @@ def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank
     crest, sd = f.heights(bank.levelled(height))
     z, bins, places = crest / sd, f.half_width / bank.spacing, slice(None, len(crest) * f.coarse, f.coarse)
     if not (local == 1.0).all():
-        z /= np.maximum(_seen(local, bins)[places], least)
+        z /= np.maximum(seen(local, bins)[places], least)
     if not quiet.all():
         z[running_mean((~quiet).astype(np.float64), max(1, int(bins)))[places] > MISSING_SHARE] = np.nan
     return np.asarray(z)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import BoolArray, FloatArray
+from mapping.base import SweepHeights
 from mapping.detection.filters import FILTER_BINS_PER_HALF_WIDTH, Bank
 
 # Share of the absolute differences of neighbouring bins, the smaller ones, whose mean tells the level of a cell: what
@@ -55,11 +56,26 @@ class LocalLevels:
         return self.doubt * min(1.0, self.shared / bins)
 
 
-def local_levels(heights: Sequence[FloatArray], quiet: Sequence[BoolArray], bank: Bank) -> LocalLevels:
-    """The level along each profile, by differences of neighbouring quiet bins."""
+def local_levels(
+    profiles: Sequence[SweepHeights], heights: Sequence[FloatArray], quiet: Sequence[BoolArray], bank: Bank
+) -> LocalLevels:
+    """The level along each profile, by differences of neighbouring quiet bins, for the samples that these have.
+
+    Args:
+        profiles: with bins of the bank's width.
+        heights: (n,) of each, m, without what is clearly no noise.
+        quiet: (n,) of each: False where something was taken out.
+        bank: filters for the fitted noise.
+    """
     lags = bank.noise.block_covariances(2, bank.spacing, bank.samples)
-    sd = float(np.sqrt(max(2 * (lags[0] - lags[1]), np.finfo(float).tiny)))
-    told = [_difference_levels(h, q, sd) for h, q in zip(heights, quiet, strict=True)]
+    white = bank.noise.white**2
+    terms = max(2 * (lags[0] - lags[1] - white / bank.samples), 0.0)
+    told = []
+    for profile, height, keep in zip(profiles, heights, quiet, strict=True):
+        counts = np.diff(profile.first)
+        share = white / np.maximum(counts, 1)
+        sd = np.sqrt(np.maximum(share[1:] + share[:-1] + terms, np.finfo(float).tiny))
+        told.append(_difference_levels(height, keep & (counts > 0), sd))  # an empty bin lies between its neighbours
     ones = [np.ones(len(h)) for h in heights]
     y = np.concatenate([each for each, _ in told])
     v = np.concatenate([each for _, each in told])
@@ -86,8 +102,13 @@ def _at_bins(level: FloatArray, bins: int) -> FloatArray:
     return np.interp(np.arange(bins), (np.arange(len(level)) + 0.5) * bins / len(level), level)
 
 
-def _difference_levels(height: FloatArray, quiet: BoolArray, sd: float) -> tuple[FloatArray, FloatArray]:
-    """(C,) logarithm of the variance in each cell, and its sampling variance, infinite where nothing is known."""
+def _difference_levels(height: FloatArray, quiet: BoolArray, sd: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(C,) logarithm of the variance in each cell, and its sampling variance, infinite where nothing is known.
+
+    Args:
+        height, quiet: (n,) of the bins.
+        sd: (n - 1,) standard deviations of their differences under the fitted law, m.
+    """
     step = np.where(quiet[1:] & quiet[:-1], np.abs(np.diff(height)) / sd, np.nan)
     cells = max(1, len(step) // LEVEL_BINS)
     edges = np.linspace(0, len(step), cells + 1).astype(np.int64)

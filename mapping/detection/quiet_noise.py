@@ -304,7 +304,9 @@ def _is_quiet(s: FloatArray, sweep: int, profiles: Sequence[SweepHeights], quiet
 def _profile_blocks(profile: SweepHeights, keep: BoolArray) -> Blocks:
     steps = np.full(len(keep), profile.spacing)
     steps[0] = -profile.spacing
-    return Blocks(np.where(keep, profile.height, np.nan), steps, profile.samples)
+    counts = np.diff(profile.first)
+    read = counts > 0  # bins without samples lie between their neighbours
+    return Blocks(np.where(keep & read, profile.height, np.nan), steps, float(1.0 / np.mean(1.0 / counts[read])))
 
 
 def _uncertainty(fit: NoiseFit, bank: Bank, tip_radius: float) -> float:

@@ -257,6 +257,23 @@ def _rates(path: Path, level: Level, rng: np.random.Generator) -> Recorded:
     return index, (path.centers + white(path, level, rng)[:, None] * path.normals)[index]
 
 
+def _speed(path: Path, level: Level, rng: np.random.Generator) -> Recorded:
+    """A tip that speeds up to four times its first speed amid each sweep, and slows down again."""
+    kept = np.zeros(len(path.sweep), dtype=bool)
+    for part in path.parts:
+        share = np.linspace(0.0, 1.0, part.stop - part.start)
+        ticks = np.floor(np.cumsum(1.0 / (1.0 + 3.0 * np.sin(np.pi * share) ** 2)))
+        kept[part] = np.diff(ticks, prepend=-1.0) > 0
+    index = np.flatnonzero(kept)
+    return index, (path.centers + white(path, level, rng)[:, None] * path.normals)[index]
+
+
+def _by_chance(path: Path, level: Level, rng: np.random.Generator) -> Recorded:
+    """One sample in three, which one chance decides."""
+    index = np.flatnonzero(rng.random(len(path.sweep)) < 1.0 / 3.0)
+    return index, (path.centers + white(path, level, rng)[:, None] * path.normals)[index]
+
+
 def _rough(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
     """White noise, and a trace whose own height varies by half of it (Rq), smooth over the length."""
     from scipy.ndimage import gaussian_filter1d
@@ -291,4 +308,6 @@ LAWS: dict[str, Law] = {
     "gaps": Law("white, three gaps a metre of half a tip radius to two", _gaps),
     "rates": Law("white, every other sweep sampled a fifth as densely", _rates),
     "roughness": Law("white, a smooth roughness of Rq half a level", _heights(_rough)),
+    "speed": Law("white, four times as fast amid each sweep as at its ends", _speed),
+    "by chance": Law("white, every third sample on average, by chance", _by_chance),
 }

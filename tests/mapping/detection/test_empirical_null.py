@@ -10,9 +10,10 @@ from scipy.special import ndtr, ndtri, stdtrit
 
 from mapping.arrays import FloatArray
 from mapping.base.base import Base
+from mapping.base.height_profile import SweepHeights
 from mapping.detection import quiet_noise
-from mapping.detection.detect import Detections, detect
-from mapping.detection.empirical_null import _heavier_tail, _outputs, _seen
+from mapping.detection.detect import Detections, detect, expected_limit
+from mapping.detection.empirical_null import _heavier_tail, _outputs, seen
 from mapping.detection.filters.matched_filter import build_bank
 from mapping.detection.level_kernels import expected_level, level_likelihood
 from mapping.detection.local_level import local_levels
@@ -79,7 +80,7 @@ def test_where_nothing_scatters_the_rounding_is_the_level() -> None:
     height, quiet = np.random.default_rng(1).standard_normal(2000), np.ones(2000, dtype=bool)
     height[1000:] = 0.0
     local = np.repeat([1.0, 1e-24], 1000)
-    assert _seen(local, bank.filters[0].half_width / bank.spacing)[-1] == 0.0
+    assert seen(local, bank.filters[0].half_width / bank.spacing)[-1] == 0.0
     outputs = _outputs(height, quiet, local, bank, 0, 1e-6)
     assert np.isfinite(outputs).all() and np.abs(outputs[-10:]).max() < 1e-6
 
@@ -183,8 +184,46 @@ def test_positions_in_steps_of_the_noise_still_tell_its_level() -> None:
     quiet = [np.ones(4000, dtype=bool)] * 4
     level = np.exp(0.5 * np.sin(np.arange(4000) / 300.0))
     exact = [level * rng.standard_normal(4000) for _ in quiet]
-    told = local_levels([np.round(2.0 * each) / 2.0 for each in exact], quiet, bank)
+    heights = [np.round(2.0 * each) / 2.0 for each in exact]
+    index, nowhere = np.arange(4001), np.zeros((4000, 3))
+    profiles = [SweepHeights(0, 0.0, 1.0, each, 1.0, index, index[1:] * 1.0, nowhere) for each in heights]
+    told = local_levels(profiles, heights, quiet, bank)
     assert 0.0 < told.doubt < 0.1 and told.doubt_over(1e6) < 0.01 * told.doubt
     # rounding to steps of half the noise adds a twelfth of their square
     off = np.log(np.concatenate(told.variance) / (np.tile(level**2, 4) + 0.25 / 12.0))
     assert abs(off.mean()) < 0.1 and off.std() < 3.0 * np.sqrt(told.doubt)
+
+
+def _even(rng: np.random.Generator) -> FloatArray:
+    return np.arange(0.0, 0.12, 50e-6)
+
+
+def _by_chance(rng: np.random.Generator) -> FloatArray:
+    return np.sort(rng.uniform(0.0, 0.12, 2400))
+
+
+def _four_times_as_fast(rng: np.random.Generator) -> FloatArray:
+    s = [0.0]
+    while s[-1] < 0.12:
+        s.append(s[-1] + 20e-6 + 60e-6 * float(np.sin(np.pi * s[-1] / 0.12)) ** 2)
+    return np.array(s)
+
+
+@pytest.mark.parametrize(("places", "worse"), [(_even, 1.05), (_by_chance, 1.3), (_four_times_as_fast, 1.2)])
+def test_samples_that_come_unevenly_are_as_noisy_as_others(
+    places: Callable[[np.random.Generator], FloatArray], worse: float
+) -> None:
+    """A hand, or a machine that speeds up: bins of several samples and of none are no noise of another law."""
+    rng, white = np.random.default_rng(5), 1e-6
+    centers, sweeps = [], []
+    for number in range(12):
+        x = places(rng)
+        centers.append(np.column_stack([x, np.full(len(x), 2e-3 * number), TIP + white * rng.standard_normal(len(x))]))
+        sweeps.append(np.full(len(x), number))
+    count = sum(map(len, sweeps))
+    trace = Trace(np.arange(float(count)), np.concatenate(centers), np.concatenate(sweeps), TIP)
+    found = detect(trace, PLATE)
+    assert found.remarks == () and not found.crossings
+    np.testing.assert_allclose(found.noise.sd, white, rtol=0.05)
+    usual = expected_limit(Noise(white), 50e-6, TIP)
+    assert 0.95 * usual < found.detection_limit < worse * usual

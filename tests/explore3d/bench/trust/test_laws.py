@@ -71,3 +71,13 @@ def test_gaps_and_rates_leave_samples_out(path: Path):
     rates = LAWS["rates"].record(path, LEVEL, np.random.default_rng(1))[0]
     counts = np.bincount(path.sweep[rates])
     assert (counts[::2] == 5 * counts[1::2]).all()
+
+
+def test_speed_and_chance_leave_samples_unevenly_apart(path: Path):
+    index = LAWS["speed"].record(path, LEVEL, np.random.default_rng(1))[0]
+    steps = np.diff(index[path.sweep[index] == path.sweep[0]])
+    ends, middle = np.append(steps[:10], steps[-10:]), steps[len(steps) // 2 - 5 : len(steps) // 2 + 5]
+    assert ends.mean() == pytest.approx(1.0, abs=0.1) and middle.mean() == pytest.approx(4.0, abs=0.4)
+    index = LAWS["by chance"].record(path, LEVEL, np.random.default_rng(1))[0]
+    steps = np.diff(index[path.sweep[index] == path.sweep[0]])
+    assert steps.mean() == pytest.approx(3.0, rel=0.2) and steps.std() == pytest.approx(6.0**0.5, rel=0.3)
