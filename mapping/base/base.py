@@ -17,6 +17,8 @@ from mapping.instrument import neighbour_scatter, robust_sd
 # The mesh of a fitted base goes on so many tip radii beyond the samples: a foot lies at most one aside of its centre,
 # on however steep a flank, and with the other no ball that touches there reaches over the border
 FIT_MARGIN = 2.0
+# Fitted families that are smooth all over: their facets stand for something rounder
+SMOOTH_FAMILIES = ("sphere", "cylinder", "quadric", "sheet", "tube", "star body")
 # Places of a surface closer together than this hang together, in tip radii. They lie 0.06 apart, and are rounded to
 # cells of half of this: links of up to 0.4 + 0.2 sqrt(3), less than half of the strip of 1.8 about the sweep that parts
 # a gap from the border
@@ -198,7 +200,9 @@ class Base:
         """Foot points and heights of ball centres (N, 3), m.
 
         The trace of a body is where its distance equals the tip radius r, also over edges and corners, so
-        the height is distance - r and the base's own edges explain themselves.
+        the height is distance - r and the base's own edges explain themselves. Of a fitted round body it is the
+        distance from that, not from its facets: where it lies over them by b, and leans from the direction to the
+        centre by a, it is nearer by b + r a^2 / 2.
         """
         query = np.asarray(centers, dtype=np.float64)
         nearest = self.nearest.query(query)
@@ -208,4 +212,9 @@ class Base:
         clear = nearest.distance > 1e-6 * tip_radius
         safe = np.where(clear, nearest.distance, 1.0)[:, None]
         normals = np.where(clear[:, None], away / safe, nearest.normals)
-        return Feet(nearest.points, normals, signed - tip_radius - self.offset, nearest.face, nearest.barycentric)
+        height = signed - tip_radius - self.offset
+        if self.kind in SMOOTH_FAMILIES:
+            lean = self.nearest.smooth_normals(nearest.face, nearest.barycentric) - normals
+            bulge = self.nearest.bulge(nearest.face, nearest.barycentric)
+            height -= bulge + 0.5 * tip_radius * np.einsum("ij,ij->i", lean, lean)
+        return Feet(nearest.points, normals, height, nearest.face, nearest.barycentric)

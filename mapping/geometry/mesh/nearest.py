@@ -125,6 +125,23 @@ class NearestPoint:
         corners = self._corner_normals(asked)[row.ravel()]
         return _unit(np.einsum("nc,ncx->nx", barycentric, corners))
 
+    def bulge(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
+        """(N,) by which the smooth body that facets stand for lies over them, m; negative where it is hollow.
+
+        Along a side e from corner i to j whose normals are n_i and n_j a curve rises over its chord by
+        t (1 - t) (n_j - n_i) e / 2, and over the face their sum with t (1 - t) replaced by the product of both
+        coordinates is exact for a quadratic.
+
+        Args:
+            face: (N,) faces in which the places lie.
+            barycentric: (N, 3) their coordinates there.
+        """
+        asked, row = np.unique(face, return_inverse=True)
+        normals, corners = self._corner_normals(asked), self.surface.vertices[self.surface.faces[asked]]
+        ahead = [1, 2, 0]
+        rise = 0.5 * np.einsum("fcx,fcx->fc", normals[:, ahead] - normals, corners[:, ahead] - corners)
+        return np.asarray(np.einsum("nc,nc->n", barycentric * barycentric[:, ahead], rise[row.ravel()]))
+
     def _corner_normals(self, face: IntArray) -> FloatArray:
         """(N, 3, 3) of each corner of some faces the mean normal of the faces about it that no crease parts from it."""
         normals, (order, first) = self.surface.face_normals, self._corners_at
@@ -187,6 +204,9 @@ class MovedNearestPoint(NearestPoint):
 
     def smooth_normals(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
         return np.asarray(self.still.smooth_normals(face, barycentric) @ self.rotation.T)
+
+    def bulge(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
+        return self.still.bulge(face, barycentric)
 
 
 class BoxedPoints:
