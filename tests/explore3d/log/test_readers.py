@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from explore3d import UserError
+from explore3d import UserError, analyze
 from explore3d.log import Inspection, inspect, load_logs
 from explore3d.log.readers import readers, registry
 from mapping import Trace
@@ -225,6 +225,19 @@ def test_inspect_says_gaps_repeats_and_sentinels(tmp_path: Path) -> None:
     found = looked(tmp_path, "x [mm];z [mm]\n" + "\n".join([*rows, rows[-1]]) + "\n", tip_radius="1 mm")
     assert (found.gaps, found.duplicates, found.samples) == (1, 1, 39)
     assert "1 left out: z is -9999" in found.read_as and "far off" in found.columns[1]["is"]
+
+
+def test_inspect_counts_in_words_and_gives_zero_no_sign(tmp_path: Path) -> None:
+    said = "\n".join(looked(tmp_path, "x [mm];z [mm]\n0;-0\n0.5;-1\n1;-0.0\n2;-2\n").lines())
+    assert "-2 to 0:" in said and "-0" not in said.replace("-0.", "")
+    assert "no gaps longer than" in said and "no repeated positions" in said and "(67 % of the steps down)" in said
+    one = "\n".join(looked(tmp_path, "x [mm];z [mm]\n1;2\n").lines())
+    assert "1 row in 1 sweep" in one
+
+
+def test_what_has_one_row_is_refused_with_its_name(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"scan\.csv: .* found 1 sample$"):
+        analyze(written(tmp_path, b"x,z\n1,2\n", "scan.csv"), tip_radius="1 mm", units="mm")
 
 
 def test_inspect_as_json_is_json_and_as_text_is_lines(tmp_path: Path) -> None:
