@@ -285,3 +285,9 @@ def test_noise_that_hides_what_was_asked_for_is_said_first(tmp_path: Path) -> No
     assert plan.account is not None and plan.account.hidden is not None and plan.account.hidden > 1e-4
     assert plan.lines()[0] == plan.account.warning()
     assert "noise" in plan.account.warning()
+
+
+def test_a_budget_that_ends_the_survey_is_said_first_with_what_it_would_take(tmp_path: Path) -> None:
+    plan = planned(tmp_path, TEXT.replace('time_budget = "10 min"', 'time_budget = "20 s"'))
+    assert plan.short and plan.account is None and plan.record()["stopped"] == plan.stopped == plan.lines()[0]
+    assert "take about 4 min 13 s at 30 mm/s" in plan.stopped and "the time budget is 20 s" in plan.stopped

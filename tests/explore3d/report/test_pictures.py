@@ -90,11 +90,13 @@ def test_an_interval_has_no_more_digits_than_are_known() -> None:
 
 
 def test_durations_and_counts_read_as_speech() -> None:
-    assert [seconds_text(v) for v in (0.012, 3.456, 42.0, 125.0, 7300.0)] == [
+    assert [seconds_text(v) for v in (0.012, 3.456, 42.0, 125.0, 7300.0, 1e6, 3e8)] == [
         "12 ms",
         "3.46 s",
         "42 s",
         "2 min 05 s",
         "2 h 01 min",
+        "12 days",
+        "10 years",
     ]
     assert [count_text(n, "ridge") for n in (0, 1, 2)] == ["no ridges", "1 ridge", "2 ridges"]
