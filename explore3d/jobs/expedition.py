@@ -207,8 +207,9 @@ def known_base(scene: Scene) -> Base | None:
     """The global model that the scene gives, None if it gives a region alone.
 
     Raises:
-        SceneError: a mesh that cannot be used, none of its surface lies in the region and faces one of the sides, or
-            a survey of it takes so much more than the time budget that a unit must be wrong.
+        SceneError: a mesh that cannot be used, none of its surface lies in the region and faces one of the sides, the
+            smallest feature is larger than it, or a survey of it takes so much more than the time budget that a unit
+            must be wrong.
     """
     surface, part = scene.base_surface(), scene.model.part
     if surface is None:
@@ -222,6 +223,11 @@ def known_base(scene: Scene) -> Base | None:
         raise SceneError(
             f"{scene.path}: model.sides: no face of the mesh that is to be explored lies within 60 degrees of one of "
             f"them; found {', '.join(scene.model.sides or ())}; turn the mesh, or name other sides"
+        )
+    if scene.smallest >= (size := float(np.ptp(surface.vertices, axis=0).max())):
+        raise SceneError(
+            f"{scene.path}: survey.smallest_feature: {length_text(scene.smallest)} high on a mesh of "
+            f"{length_text(size)}; nothing so high fits on it: are the units of both the right ones?"
         )
     base = Base(surface)
     seconds, sentence = foretold_survey(scene, base)
