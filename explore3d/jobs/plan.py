@@ -131,15 +131,15 @@ class DryRun:
     def lines(self) -> list[str]:
         """The plan in words."""
         sweeps = count_text(sum(move.purpose == "sweep" for move in self.moves), "sweep")
-        first = (
-            f"{sweeps} at {1e3 * self.speed:.3g} mm/s, {length_text(self.metres)} of finger path, "
-            f"{seconds_text(self.seconds)}"
-        )
+        if self.pecking is None:
+            pace, time = f" at {1e3 * self.speed:.3g} mm/s", seconds_text(self.seconds)
+        else:
+            pace, time = "", f"pecking takes it about {seconds_text(self.pecking)}, ways included"
+        first = f"{sweeps}{pace}, {length_text(self.metres)} of finger path, {time}"
         broken = [f"move {number}: {what}" for number, what in self.violations]
         assumed = [self.assumed] if self.assumed else []
         account = [] if self.account is None else [self.account.sentence()]
         warning = [self.account.warning()] if self.account is not None and self.account.warning() else []
-        told = [] if self.pecking is None else [f"pecking takes it about {seconds_text(self.pecking)}, ways included"]
         more = [] if self.detail is None else [self.detail.sentence()]
         mesh = [f"the mesh: {self.mesh}"] if self.mesh else []
         before = [*([self.stopped] if self.stopped else []), *warning, *mesh, *assumed]
@@ -149,7 +149,7 @@ class DryRun:
                 f"A sharp crest {length_text(self.limit, 2)} high or higher is seen with 95 % where a sweep crosses it."
             )
             shown = [f"{crest} {groove_sentence(self.limit, self.tip_radius)}"]
-        return [*before, first, *more, *told, *shown, *account, *(broken or ["no move breaks a limit"])]
+        return [*before, first, *more, *shown, *account, *(broken or ["no move breaks a limit"])]
 
     def picture(self) -> bytes:
         """PNG of the base with the planned sweeps on it."""

@@ -268,8 +268,8 @@ def tip_sentence(analysis: Analysis) -> list[str]:
     if not provenance.get("tip_sd_assumed"):
         return []
     return [
-        f"The tip's radius is {length_text(radius)} as stated; how far that can be trusted nobody stated (--tip-sd "
-        f"does): ± {length_text(sd, 2)} ({100 * sd / radius:.2g} %) is assumed. Widths and heights carry that doubt."
+        f"The tip's radius is {length_text(radius)} as stated. How well it is known was not stated (--tip-sd states "
+        f"it): ± {length_text(sd, 2)} ({100 * sd / radius:.2g} %) is assumed. Widths and heights carry that doubt."
     ]
 
 

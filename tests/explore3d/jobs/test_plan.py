@@ -150,9 +150,12 @@ def test_pecks_far_apart_leave_surface_between_them(tmp_path: Path) -> None:
     text = WIRE.with_name("grbl_peck.toml").read_text()
     swept = []
     for step in ("0.5 mm", "4 mm"):
-        account = planned(tmp_path, text.replace('step = "0.5 mm"', f'step = "{step}"')).account
-        assert account is not None
-        swept.append(account.swept)
+        plan = planned(tmp_path, text.replace('step = "0.5 mm"', f'step = "{step}"'))
+        assert plan.account is not None
+        swept.append(plan.account.swept)
+        # one time is told, that of the pecks, not that of sliding at the speed of the sweeps
+        (told,) = (line for line in plan.lines() if "of finger path" in line)
+        assert re.search(r"finger path, pecking takes it about .*, ways included$", told) and "mm/s" not in told
     assert swept[0] > 0.99 and swept[1] < 0.96
 
 

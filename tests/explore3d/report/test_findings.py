@@ -239,5 +239,5 @@ def test_a_doubt_of_the_tip_that_was_assumed_is_said() -> None:
     found = analysis()
     found.model.provenance = {"tip_sd_assumed": True, "tip_sd": 1e-4}
     said = summary(found)[-1]
-    assert said.startswith("The tip's radius is 10 mm as stated; how far that can be trusted nobody stated")
+    assert said.startswith("The tip's radius is 10 mm as stated. How well it is known was not stated")
     assert "± 0.1 mm (1 %) is assumed" in said
