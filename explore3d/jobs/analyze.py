@@ -15,7 +15,7 @@ from explore3d.jobs.objects import not_one_object
 from explore3d.jobs.session import Job, Session
 from explore3d.log import LOG, digest, large_log, load_logs, must_fit_analysis, read_base, sidecar_of
 from explore3d.scene import load_mesh, read_tolerances, recorded_scene
-from mapping import TraceError
+from mapping import FormError, TraceError
 from mapping.base import Base
 from mapping.geometry.mesh import algebra_in_one_thread
 
@@ -213,5 +213,5 @@ def _analyze(
             return build_model(log, scene, base, stages)
         run = run_key(log.sha256, told.record(paths))
         return conclude(session, log, scene, base, stages, report=report, run=run)
-    except TraceError as error:  # too few samples, or all of them in one place: of which file
+    except (TraceError, FormError) as error:  # too few samples, all in one place, no form for them: of which file
         raise UserError(f"{', '.join(log.sources)}: {error}") from error

@@ -69,15 +69,18 @@ class Form:
         """(N,) True of the samples that the base is fitted to.
 
         Raises:
-            FormError: the masks leave hardly anything.
+            FormError: there is hardly anything, or the masks leave it.
         """
         x = trace.centers[:, 0]
         keep = np.ones(len(x), dtype=bool)
         for low, high in self.masks:
             keep &= (x < low) | (x > high)
         if keep.sum() < FEWEST_SAMPLES:
-            asked = ", ".join(f"{low:g}..{high:g} m" for low, high in self.masks)
-            raise FormError(f"the masks {asked} leave {keep.sum()} samples; a base needs at least {FEWEST_SAMPLES}")
+            found = f"{len(keep)} sample{'s' * (len(keep) != 1)}"
+            if self.masks:
+                asked = ", ".join(f"{low:g}..{high:g} m" for low, high in self.masks)
+                found += f", of which the masks {asked} leave {keep.sum()}"
+            raise FormError(f"the base of a profile needs at least {FEWEST_SAMPLES} samples; found {found}")
         return keep
 
 

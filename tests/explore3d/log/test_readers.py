@@ -238,6 +238,9 @@ def test_inspect_counts_in_words_and_gives_zero_no_sign(tmp_path: Path) -> None:
 def test_what_has_one_row_is_refused_with_its_name(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"scan\.csv: .* found 1 sample$"):
         analyze(written(tmp_path, b"x,z\n1,2\n", "scan.csv"), tip_radius="1 mm", units="mm")
+    four = written(tmp_path, b"x,z\n1,2\n2,2\n3,2.5\n4,2\n", "four.csv")
+    with pytest.raises(UserError, match=r"four\.csv: the base of a profile needs at least 8 samples; found 4 samples$"):
+        analyze(four, tip_radius="1 mm", units="mm")
 
 
 def test_inspect_as_json_is_json_and_as_text_is_lines(tmp_path: Path) -> None:
