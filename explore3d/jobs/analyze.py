@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,12 @@ from explore3d.scene import load_mesh, read_tolerances, recorded_scene
 from mapping import FormError, TraceError
 from mapping.base import Base
 from mapping.geometry.mesh import algebra_in_one_thread
+
+# What `analyze` hands on to load_logs and to the readers
+READING_SETTINGS = (
+    "tip_sd", "form", "mask", "tolerances", "units", "columns", "frame", "jump", "reference", "decimal", "pixel",
+    "average", "part",
+)  # fmt: skip
 
 
 @algebra_in_one_thread()
@@ -56,8 +63,10 @@ def analyze(
 
     Raises:
         UserError: input that cannot be used, named by file and field.
+        TypeError: what is no file's name, or a setting that there is not.
     """
-    paths = [logs] if isinstance(logs, str | Path) else list(logs)
+    paths = [logs] if isinstance(logs, str | Path) else [*logs]
+    _must_be_recordings(paths, table)
     told = Told(tip_radius, model, model_units, tuple(force), quick, table, cutoffs)
     if out is not None:
         words = ["explore3d", "analyze", *map(str, paths), "--out", str(out), *told.words()]
@@ -67,6 +76,22 @@ def analyze(
             found = _analyze(paths, session, told, progress, report and not quick)
         return replace(found, folder=session.folder)
     return _analyze(paths, None, told, progress, False)
+
+
+def _must_be_recordings(paths: Sequence[Any], table: Mapping[str, Any]) -> None:
+    """Raises TypeError: one of them is no file's name, or a setting of their readers is none."""
+    for path in paths:
+        if not isinstance(path, str | Path):
+            raise TypeError(
+                f"a recording is the name of a file; found {type(path).__name__}; numpy.save writes an array to one"
+            )
+    for name in table:
+        if name not in READING_SETTINGS:
+            near = get_close_matches(name, READING_SETTINGS, n=1)
+            hint = f" did you mean {near[0]!r}?" if near else ""
+            raise TypeError(
+                f"there is no setting {name!r} of a recording;{hint} possible: {', '.join(READING_SETTINGS)}"
+            )
 
 
 @dataclass(frozen=True)

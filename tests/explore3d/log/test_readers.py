@@ -243,6 +243,19 @@ def test_what_has_one_row_is_refused_with_its_name(tmp_path: Path) -> None:
         analyze(four, tip_radius="1 mm", units="mm")
 
 
+def test_a_program_is_told_which_setting_or_file_it_got_wrong_and_sees_a_result_in_a_line(tmp_path: Path) -> None:
+    path = written(tmp_path, CSV.encode(), "scan.csv")
+    with pytest.raises(TypeError, match="no setting 'unit' of a recording; did you mean 'units'"):
+        analyze(path, tip_radius="1 mm", unit="mm")
+    with pytest.raises(TypeError, match=r"the name of a file; found ndarray; numpy\.save"):
+        analyze(POINTS, tip_radius="1 mm")  # type: ignore[arg-type]
+    said = repr(analyze(path, tip_radius="1 mm", units="mm", quick=True))
+    assert said.startswith(
+        "<Analysis of 'scan.csv': <LaidTrace: 80 samples in 4 sweeps of a tip of 1 mm>, <ObjectModel"
+    )
+    assert "\n" not in said
+
+
 def test_inspect_as_json_is_json_and_as_text_is_lines(tmp_path: Path) -> None:
     from dataclasses import asdict
 
