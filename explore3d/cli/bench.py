@@ -41,7 +41,7 @@ def all_stages(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Measure error against run time: all stages, or one of them by a command of its own.
+    """Measure error against run time: all stages, or one of them by a command of its own; ends with 1 if one fails.
 
     Example: explore3d bench --quick --out out/bench
     """
@@ -63,6 +63,8 @@ def all_stages(
         print(dumps(as_record(measured, quick) | {"page": str(page), "summary": summary(measured)}))
     else:
         print(f"page: {page}\n{summary(measured)}")
+    if not all(each.points for each in measured):
+        raise typer.Exit(1)
 
 
 @bench.command()
