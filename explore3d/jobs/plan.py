@@ -34,6 +34,8 @@ from planners.explore import Discover, SurveyCount
 REHEARSED_HEIGHT, REHEARSED_LENGTH, REHEARSED_WIDTH, REHEARSED_TURN = 2.0, 5.0, 3.0, 0.6
 # Room about a rehearsed detail, in tip radii: circuits and slides reach less than one beyond it
 REHEARSED_ROOM = 3.0
+# Moves that break a limit and are told one by one: on a body with a fold there are hundreds, for a few reasons
+MOST_LISTED_MOVES = 10
 # Places of a surface between which the mean way is asked
 WAY_PLACES = 300
 
@@ -136,7 +138,9 @@ class DryRun:
         else:
             pace, time = "", f"pecking takes it about {seconds_text(self.pecking)}, ways included"
         first = f"{sweeps}{pace}, {length_text(self.metres)} of finger path, {time}"
-        broken = [f"move {number}: {what}" for number, what in self.violations]
+        broken = [f"move {number}: {what}" for number, what in self.violations[:MOST_LISTED_MOVES]]
+        if (more_broken := len(self.violations) - MOST_LISTED_MOVES) > 0:
+            broken.append(f"and {count_text(more_broken, 'more such move')}; --json lists all")
         assumed = [self.assumed] if self.assumed else []
         account = [] if self.account is None else [self.account.sentence()]
         warning = [self.account.warning()] if self.account is not None and self.account.warning() else []

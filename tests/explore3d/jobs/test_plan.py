@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -294,3 +295,12 @@ def test_a_budget_that_ends_the_survey_is_said_first_with_what_it_would_take(tmp
     plan = planned(tmp_path, TEXT.replace('time_budget = "10 min"', 'time_budget = "20 s"'))
     assert plan.short and plan.account is None and plan.record()["stopped"] == plan.stopped == plan.lines()[0]
     assert "take about 4 min 13 s at 30 mm/s" in plan.stopped and "the time budget is 20 s" in plan.stopped
+
+
+def test_of_many_moves_that_break_a_limit_some_are_told(tmp_path: Path) -> None:
+    plan = planned(tmp_path, TEXT.replace('time_budget = "10 min"', 'time_budget = "20 s"'))
+    many = replace(plan, violations=tuple((number, "too far") for number in range(1, 15)))
+    assert many.lines()[-1] == "and 4 more such moves; --json lists all"
+    assert sum(line.startswith("move ") for line in many.lines()) == 10 and len(many.record()["violations"]) == 14
+    few = replace(plan, violations=((1, "too far"),))
+    assert few.lines()[-1] == "move 1: too far"
