@@ -7,6 +7,7 @@ import io
 import json
 import pickle
 import struct
+import warnings
 import zipfile
 from collections.abc import Mapping
 from importlib.metadata import EntryPoint
@@ -241,6 +242,20 @@ def test_what_has_one_row_is_refused_with_its_name(tmp_path: Path) -> None:
     four = written(tmp_path, b"x,z\n1,2\n2,2\n3,2.5\n4,2\n", "four.csv")
     with pytest.raises(UserError, match=r"four\.csv: the base of a profile needs at least 8 samples; found 4 samples$"):
         analyze(four, tip_radius="1 mm", units="mm")
+
+
+def test_a_folder_that_is_no_session_is_refused_as_that(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no session is in that folder: it holds no log"):
+        inspect(tmp_path)
+
+
+def test_a_profile_too_coarse_to_show_anything_is_analysed_without_a_raw_warning(tmp_path: Path) -> None:
+    x = np.arange(80) * 0.05
+    rows = "".join(f"{a:.3f},{z:.7f}\n" for a, z in zip(x, RNG.normal(0.0, 1e-6, 80), strict=True))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = analyze(written(tmp_path, f"x,z\n{rows}".encode(), "c.csv"), tip_radius="2 um", units="mm", quick=True)
+    assert not np.isfinite(found.detections.detection_limit)
 
 
 def test_a_program_is_told_which_setting_or_file_it_got_wrong_and_sees_a_result_in_a_line(tmp_path: Path) -> None:
