@@ -57,6 +57,7 @@ def all_stages(
         if not json:
             print(f"{each.stage.name:20}{len(each.points):4} points{each.seconds:8.1f} s", flush=True)
 
+    out.mkdir(parents=True, exist_ok=True)  # what cannot be written is said before minutes are spent
     measured = run(quick, peers, told)
     page = write(measured, out, quick)
     if json:

@@ -83,3 +83,15 @@ def test_default_moves_sample_what_ours_settled_on():
     seen = []
     _default_emcee(trace, base, feature, (20,), lambda draws: seen.append(draws.shape[1]) or 0.0)
     assert seen == [len(posterior.names)]
+
+
+@pytest.mark.parametrize("command", ["bench", "stability"])
+def test_a_folder_that_cannot_be_made_is_said_before_anything_is_measured(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    (tmp_path / "file").write_text("no folder")
+    stages = (Stage("never", "error", "", "", lambda quick, peers: pytest.fail("it was measured")),)
+    monkeypatch.setattr(sys.modules[bench.__module__], "stages", lambda: stages)
+    monkeypatch.setattr("explore3d.stability.stability", lambda names: pytest.fail("it was asked"))
+    assert explore3d_main(monkeypatch, command, "--out", tmp_path / "file" / "out") == 2
+    assert capsys.readouterr().err.endswith("file/out: Not a directory\n")
