@@ -84,7 +84,10 @@ class Link:
                 self._serial.exclusive = True
             self._serial.open()
         except (SerialException, OSError, ValueError) as error:
-            raise LinkError(f"cannot open {self.port}: {error}; {_advice(self.port)}") from error
+            # pyserial wraps what the system says once or twice; its own words begin after the number
+            number = error.errno if isinstance(error, OSError) else None
+            why = os.strerror(number) if number else str(error)
+            raise LinkError(f"cannot open {self.port}: {why}; {_advice(self.port)}") from error
         self.error, self._closing = None, False
         self.heard = time.monotonic()
         self._reader = threading.Thread(target=self._read, name=f"link {self.port}", daemon=True)

@@ -58,6 +58,11 @@ def _unit(name: str) -> tuple[float, str]:
     return units[name], name
 
 
+def _unsigned(value: float, places: int) -> float:
+    """Rounded, and never a zero with a sign."""
+    return round(value, places) + 0.0
+
+
 def _rounded(value: float, digits: int) -> str:
     if value == 0.0:
         return "0"
@@ -127,7 +132,9 @@ class Interval:
             return f"{_rounded(self.median / factor, 3)} {name}", ""
         # Two digits of the half width: what is beyond is noise.
         places = max(0, 1 - math.floor(math.log10(0.5 * spread / factor)))
-        low, median, high = (f"{value / factor:.{places}f}" for value in (self.low, self.median, self.high))
+        low, median, high = (
+            f"{_unsigned(value / factor, places):.{places}f}" for value in (self.low, self.median, self.high)
+        )
         return f"{median} {name}", f"{low} to {high}"
 
     def __format__(self, unit: str) -> str:

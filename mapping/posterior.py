@@ -11,6 +11,7 @@ from mapping.arrays import FloatArray
 
 # Panels of a plot that stand beside one another
 PANELS_BESIDE = 4
+PLOT_TICKS = 3
 POSTERIOR_STATUSES = ("converged", "chain too short", "stuck", "not needed")
 
 
@@ -61,13 +62,18 @@ class Posterior:
             figure = plt.figure(figsize=(2.4 * min(count, PANELS_BESIDE), 2.0 * -(-count // PANELS_BESIDE)))
             figure.set_layout_engine("constrained")
         panels = figure.subplots(-(-count // PANELS_BESIDE), min(count, PANELS_BESIDE), squeeze=False).ravel()
-        for axes, name, unit, draws in zip(panels, self.names, self.units, self.samples.T, strict=False):
+        for axes, name, unit, values in zip(panels, self.names, self.units, self.samples.T, strict=False):
+            # lengths in the unit that their range reads well in, and few ticks: long numbers ran into one another
+            factor, unit = _plotted_unit(values) if unit == "m" else (1.0, unit)
+            draws = values / factor
             low, median, high = np.quantile(draws, [0.05, 0.5, 0.95])
             axes.axvspan(low, high, color="#b91c1c", alpha=0.15)
             axes.hist(draws, bins="auto", histtype="step", color="#1f2933")
             axes.axvline(median, color="#b91c1c")
             axes.set_xlabel(f"{name} ({unit})" if unit else name)
             axes.set_yticks([])
+            axes.locator_params(axis="x", nbins=PLOT_TICKS)
+            axes.ticklabel_format(axis="x", useOffset=False)
         for axes in panels[count:]:
             axes.remove()
         return figure
@@ -77,3 +83,9 @@ class Posterior:
         if name not in self.names:
             raise KeyError(f"posterior has no parameter {name!r}; it has {', '.join(self.names)}")
         return np.asarray(self.samples[:, self.names.index(name)])
+
+
+def _plotted_unit(values: FloatArray) -> tuple[float, str]:
+    """The unit of length (m, name) in which draws of a length are drawn: micrometres next to zero, else millimetres."""
+    largest = float(np.abs(values).max(initial=0.0))
+    return (1e-6, "µm") if largest < 1e-4 else (1e-3, "mm")

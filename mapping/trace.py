@@ -56,6 +56,10 @@ class Trace:
             if getattr(self, name) is not None:
                 self._freeze(name, (count, 3), np.float64)
 
+    def __repr__(self) -> str:
+        sweeps, tip = len(np.unique(self.sweep)), f"{1e3 * self.tip_radius:g} mm"
+        return f"<{type(self).__name__}: {len(self.t)} samples in {sweeps} sweeps of a tip of {tip}>"
+
     def _freeze(self, name: str, shape: tuple[int, ...], dtype: type) -> None:
         given = getattr(self, name)
         # an array that nobody can write to any more needs no copy: one that is read-only, and no view of another

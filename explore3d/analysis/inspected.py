@@ -69,9 +69,8 @@ class Inspected:
         if base.kind == "profile":  # a strip as wide as one likes: all of it lies under the one sweep
             height = np.full(len(base.surface.faces), limit)
             middle = base.surface.vertices[base.surface.faces].mean(axis=1)
-            found = FoundHeights(
-                height - limit, height - limit, base.surface.face_areas, middle, base.surface.face_normals
-            )
+            none = np.zeros(len(height))  # above the limit; that may be infinite
+            found = FoundHeights(none, none, base.surface.face_areas, middle, base.surface.face_normals)
             return cls(height, found, limit, detections.probability, asked)
         laid = LaidTrace.of(trace, base)
         if seen is not None and not (kept := np.isin(laid.sweep, list(seen))).all():

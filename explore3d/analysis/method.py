@@ -847,7 +847,9 @@ def in_model_frame(features: tuple[Feature, ...], base: Base) -> tuple[Feature, 
 
 def why_no_time_curve(work: Work) -> str:
     """Errors need a truth."""
-    return "" if work.truth and work.model.features else "no true feature is stated, or nothing was found"
+    if not work.truth:
+        return "no true feature is stated"
+    return "" if work.model.features else "nothing was found"
 
 
 def compared_in_time(work: Work, share: Share) -> None:

@@ -137,6 +137,9 @@ class Analysis:
     standard_heights: tuple[StandardHeight, ...] = ()
     computing: Computing | None = None
 
+    def __repr__(self) -> str:
+        return f"<Analysis of {self.title!r}: {self.trace!r}, {self.model!r}>"
+
     @property
     def refused(self) -> bool:
         """True if nothing was looked for, since the model is wrong beyond repair."""

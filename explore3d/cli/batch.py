@@ -98,7 +98,7 @@ def batch(
     if result.verdicts:
         print(f"tolerances: {', '.join(f'{number} {verdict}' for verdict, number in result.verdicts.most_common())}")
     for log, status, reason in result.failures[:MOST_LISTED_FAILURES]:
-        print(f"  {log}: {status}: {reason}")
+        print(f"  {log}: {status}: {reason.removeprefix(f'{log}: ')}")
     if len(result.failures) > MOST_LISTED_FAILURES:
         print(f"  and {len(result.failures) - MOST_LISTED_FAILURES} more without a result, see the column reason")
     print(f"store: {out}")

@@ -46,7 +46,9 @@ def init(
     """
     from json import dumps
 
-    from explore3d.scene import FINGER_KINDS, begin_scene, load_mesh, mesh_text
+    from explore3d.jobs import foretold_survey
+    from explore3d.scene import FINGER_KINDS, begin_scene, load_mesh, load_scene, mesh_text
+    from mapping.base import Base
 
     if finger not in FINGER_KINDS:
         raise UserError(f"--finger {finger!r}: there is no such finger; possible: {', '.join(FINGER_KINDS)}")
@@ -65,7 +67,11 @@ def init(
         units = units or _asked(f"Unit of length in {mesh.name} (m, mm, in)", "--units")
         tip_radius = tip_radius or _asked("Radius of the spherical tip, with its unit (5 mm)", "--tip-radius")
         scene = begin_scene(folder, mesh, units, tip_radius, finger, port)
-        about = f"\nthe mesh: {mesh_text(load_mesh(mesh, units))}"
+        surface = load_mesh(mesh, units)
+        about = f"\nthe mesh: {mesh_text(surface)}"
+        seconds, sentence = foretold_survey(begun := load_scene(scene), Base(surface))
+        if seconds > begun.explore.time_budget:  # a wrong unit, most often
+            about += f"\n{sentence}: is {units!r} its unit?"
     plan = shlex.join(["explore3d", "plan", str(scene)])
     explore = shlex.join(["explore3d", "run", str(scene), "--out", str(scene.parent / "out")])
     if must_compile():

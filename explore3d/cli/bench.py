@@ -41,7 +41,7 @@ def all_stages(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Measure error against run time: all stages, or one of them by a command of its own.
+    """Measure error against run time: all stages, or one of them by a command of its own; ends with 1 if one fails.
 
     Example: explore3d bench --quick --out out/bench
     """
@@ -57,12 +57,15 @@ def all_stages(
         if not json:
             print(f"{each.stage.name:20}{len(each.points):4} points{each.seconds:8.1f} s", flush=True)
 
+    out.mkdir(parents=True, exist_ok=True)  # what cannot be written is said before minutes are spent
     measured = run(quick, peers, told)
     page = write(measured, out, quick)
     if json:
         print(dumps(as_record(measured, quick) | {"page": str(page), "summary": summary(measured)}))
     else:
         print(f"page: {page}\n{summary(measured)}")
+    if not all(each.points for each in measured):
+        raise typer.Exit(1)
 
 
 @bench.command()

@@ -227,7 +227,7 @@ def controller(port: str, baudrate: int) -> list[Check]:
             Check(port, "ok", f"{machine.firmware}, {place}, {1e3 * machine.round_trip:.0f} ms to ask", needed_for),
             Check("travel", "ok", f"{low.round(3).tolist()} to {high.round(3).tolist()} mm", "the limits of all moves"),
             Check("speed", "ok", f"{(1e3 * settings.max_rate).round(1).tolist()} mm/s", "the limits of all moves"),
-            Check("resolution", "ok", f"{1e6 * settings.resolution:.1f} um", "what can be seen at all"),
+            Check("resolution", "ok", f"{1e6 * settings.resolution:.1f} µm", "what can be seen at all"),
         ]
         return told + [Check("doubt", "note", doubt, needed_for) for doubt in machine.doubts]
 

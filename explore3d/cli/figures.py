@@ -61,13 +61,14 @@ def stability(
     names = [name for name in cases() if only is None or only.lower() in name.lower()]
     if not names:
         raise UserError(f"--only: no case is called {only!r}; groups are {', '.join(sorted(_groups()))}")
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)  # what cannot be written is said before minutes are spent
     rows: list[Row] = []
     for row in run(names):
         rows.append(row)
         if not json:
             print(_line(row), flush=True)
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
         write_whole(out / "stability.csv", as_csv(rows))
         write_whole(out / "stability.html", stability_page(rows))
         if not json:

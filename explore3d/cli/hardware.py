@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from explore3d import UserError
+from explore3d import UserError, count_text, seconds_text
 from explore3d.cli.options import FilesFrom, Json, length, point
 from explore3d.cli.run import SceneFile
 
@@ -113,10 +113,12 @@ def selftest(
     Example: explore3d selftest scene.toml --radius "12.5 mm" --arm
     """
     from explore3d.jobs.machines import as_json, selftest as test
+    from mapping import length_text
 
     sphere = length("--radius", radius, positive=True)
     found = test(scene, sphere, point("--center", center), arm=arm, files_from=files_from or ())
-    words = f"range of radii {1e3 * found['range']:.4f} mm in {found['time']:.1f} s ({found['samples']:.0f} contacts)"
+    contacts = count_text(int(found["samples"]), "contact")
+    words = f"range of radii {length_text(found['range'])} in {seconds_text(found['time'])} ({contacts})"
     print(as_json(found) if json else words)
 
 

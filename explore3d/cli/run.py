@@ -102,4 +102,4 @@ def _planned(scene: Path, out: Path | None, json: bool, overwrite: bool, files_f
     else:
         picture = [] if out is None else [f"picture: {out / 'plan.png'}"]
         print("\n".join([*planned.lines(), *picture, f"next: explore3d run {quote(str(scene))} --out FOLDER"]))
-    return planned.account is not None and planned.account.short
+    return planned.short

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         Explorer as Explorer,
         Waits as Waits,
         explorer as explorer,
+        foretold_survey as foretold_survey,
     )
     from explore3d.jobs.merge import load as load, merge as merge
     from explore3d.jobs.plan import plan_into as plan_into, plan_scene as plan_scene
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "analyze": ("Told", "analyze", "analyze_each", "log_path"),
     "compare": ("Compared", "compare", "watched"),
-    "expedition": ("Explored", "Explorer", "Waits", "explorer"),
+    "expedition": ("Explored", "Explorer", "Waits", "explorer", "foretold_survey"),
     "merge": ("load", "merge"),
     "plan": ("plan_into", "plan_scene"),
     "resume": ("Execute", "Replay"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,15 @@ from explore3d.jobs.objects import not_one_object
 from explore3d.jobs.session import Job, Session
 from explore3d.log import LOG, digest, large_log, load_logs, must_fit_analysis, read_base, sidecar_of
 from explore3d.scene import load_mesh, read_tolerances, recorded_scene
+from mapping import FormError, TraceError
 from mapping.base import Base
 from mapping.geometry.mesh import algebra_in_one_thread
+
+# What `analyze` hands on to load_logs and to the readers
+READING_SETTINGS = (
+    "tip_sd", "form", "mask", "tolerances", "units", "columns", "frame", "jump", "reference", "decimal", "pixel",
+    "average", "part",
+)  # fmt: skip
 
 
 @algebra_in_one_thread()
@@ -55,8 +63,10 @@ def analyze(
 
     Raises:
         UserError: input that cannot be used, named by file and field.
+        TypeError: what is no file's name, or a setting that there is not.
     """
-    paths = [logs] if isinstance(logs, str | Path) else list(logs)
+    paths = [logs] if isinstance(logs, str | Path) else [*logs]
+    _must_be_recordings(paths, table)
     told = Told(tip_radius, model, model_units, tuple(force), quick, table, cutoffs)
     if out is not None:
         words = ["explore3d", "analyze", *map(str, paths), "--out", str(out), *told.words()]
@@ -66,6 +76,22 @@ def analyze(
             found = _analyze(paths, session, told, progress, report and not quick)
         return replace(found, folder=session.folder)
     return _analyze(paths, None, told, progress, False)
+
+
+def _must_be_recordings(paths: Sequence[Any], table: Mapping[str, Any]) -> None:
+    """Raises TypeError: one of them is no file's name, or a setting of their readers is none."""
+    for path in paths:
+        if not isinstance(path, str | Path):
+            raise TypeError(
+                f"a recording is the name of a file; found {type(path).__name__}; numpy.save writes an array to one"
+            )
+    for name in table:
+        if name not in READING_SETTINGS:
+            near = get_close_matches(name, READING_SETTINGS, n=1)
+            hint = f" did you mean {near[0]!r}?" if near else ""
+            raise TypeError(
+                f"there is no setting {name!r} of a recording;{hint} possible: {', '.join(READING_SETTINGS)}"
+            )
 
 
 @dataclass(frozen=True)
@@ -207,7 +233,10 @@ def _analyze(
         scene = recorded_scene(log.scene_text, log.sources[0]) if log.scene_text else None
         given = None if told.model is None else Base(load_mesh(told.model, told.model_units))
         base = given or read_base(log.events)
-    if session is None:
-        return build_model(log, scene, base, stages)
-    run = run_key(log.sha256, told.record(paths))
-    return conclude(session, log, scene, base, stages, report=report, run=run)
+    try:
+        if session is None:
+            return build_model(log, scene, base, stages)
+        run = run_key(log.sha256, told.record(paths))
+        return conclude(session, log, scene, base, stages, report=report, run=run)
+    except (TraceError, FormError) as error:  # too few samples, all in one place, no form for them: of which file
+        raise UserError(f"{', '.join(log.sources)}: {error}") from error

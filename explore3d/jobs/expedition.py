@@ -14,20 +14,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from explore3d import SceneError
+from explore3d import SceneError, seconds_text
 from explore3d.analysis import Computing
 from explore3d.log import KIND, SURVEY, Stop, base_event
+from explore3d.scene import extent_text
 from hw import FingerError, Move, Workspace
 from mapping import FloatArray, Trace, length_text
 from mapping.base import Base
 from mapping.geometry.mesh import asked_part
-from planners import Outcome, Plan, Spent, drive, within
+from planners import Outcome, Plan, Spent, Survey, drive, within
 from planners.explore import Discover, Explore, Locate, SurveyCount
 from planners.paths import FeltDetails, Limits, Ways, routed
 
 if TYPE_CHECKING:
     from explore3d.scene import Scene
 
+# Times the time budget that a survey may be foretold to take: nobody resumes a run so often, while a length that is
+# wrong by its unit, in cm for mm at the least, makes it a hundredfold. Laying out so many sweeps of 10 min takes 10 s
+MOST_BUDGETS = 100.0
 # An unknown body stands on something: where no side is named it is approached from above
 ABOVE = ("+z",)
 Execute = Callable[[Move], Trace]
@@ -203,7 +207,9 @@ def known_base(scene: Scene) -> Base | None:
     """The global model that the scene gives, None if it gives a region alone.
 
     Raises:
-        SceneError: a mesh that cannot be used, or none of its surface lies in the region and faces one of the sides.
+        SceneError: a mesh that cannot be used, none of its surface lies in the region and faces one of the sides, the
+            smallest feature is larger than it, or a survey of it takes so much more than the time budget that a unit
+            must be wrong.
     """
     surface, part = scene.base_surface(), scene.model.part
     if surface is None:
@@ -218,7 +224,36 @@ def known_base(scene: Scene) -> Base | None:
             f"{scene.path}: model.sides: no face of the mesh that is to be explored lies within 60 degrees of one of "
             f"them; found {', '.join(scene.model.sides or ())}; turn the mesh, or name other sides"
         )
-    return Base(surface)
+    if scene.smallest >= (size := float(np.ptp(surface.vertices, axis=0).max())):
+        raise SceneError(
+            f"{scene.path}: survey.smallest_feature: {length_text(scene.smallest)} high on a mesh of "
+            f"{length_text(size)}; nothing so high fits on it: are the units of both the right ones?"
+        )
+    base = Base(surface)
+    seconds, sentence = foretold_survey(scene, base)
+    if seconds > MOST_BUDGETS * scene.explore.time_budget:
+        raise SceneError(
+            f"{scene.path}: model.units: {sentence}; found {scene.model.units!r}, is that the mesh's unit? If it is, "
+            f"raise survey.smallest_feature ({length_text(scene.smallest)}) or explore.time_budget, or name a "
+            "model.region"
+        )
+    return base
+
+
+def foretold_survey(scene: Scene, base: Base) -> tuple[float, str]:
+    """Finger time of the survey before any sweep is laid out, s, and a sentence by which a wrong unit is noticed."""
+    survey = Survey(
+        base=base,
+        tip_radius=scene.tip.radius,
+        smallest=scene.smallest,
+        shortest_ridge=scene.survey.shortest_ridge,
+        **scene.model.asked,
+    )
+    seconds, size = survey.foretold_path / scene.sweep_speed, extent_text(survey.surface or base.surface)
+    return seconds, (
+        f"the sweeps over {size} take about {seconds_text(seconds)} at {1e3 * scene.sweep_speed:.3g} mm/s without the "
+        f"ways between them, and the time budget is {seconds_text(scene.explore.time_budget)}"
+    )
 
 
 def _box_text(low: FloatArray, high: FloatArray) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from explore3d import count_text, seconds_text
 from explore3d.analysis import Progress, Stages, SurfaceAccount, silent
-from explore3d.jobs.expedition import Explorer, explorer
+from explore3d.jobs.expedition import Explorer, explorer, foretold_survey
 from explore3d.jobs.run import open_scene, scene_digest, scene_finger
 from explore3d.jobs.session import Job, Session
 from explore3d.pictures import plan_picture
@@ -34,6 +34,8 @@ from planners.explore import Discover, SurveyCount
 REHEARSED_HEIGHT, REHEARSED_LENGTH, REHEARSED_WIDTH, REHEARSED_TURN = 2.0, 5.0, 3.0, 0.6
 # Room about a rehearsed detail, in tip radii: circuits and slides reach less than one beyond it
 REHEARSED_ROOM = 3.0
+# Moves that break a limit and are told one by one: on a body with a fold there are hundreds, for a few reasons
+MOST_LISTED_MOVES = 10
 # Places of a surface between which the mean way is asked
 WAY_PLACES = 300
 
@@ -74,11 +76,12 @@ class DryRun:
         speed: of the sweeps, m/s.
         violations: (number of the move, what limit it breaks).
         account: what of the surface the sweeps would sweep; None if the time budget ends before the survey.
-        assumed: what had to be assumed of the object, and what the plan falls short of; a sentence or "".
+        assumed: what had to be assumed of the object; a sentence or "".
         pecking: s that the moves will take by the finger's own forecast, where it touches point by point; else None.
         detail: what each detail that is found adds; None where that cannot be rehearsed.
         mesh: size, faces and borders of the global model's mesh in words, "" without one.
         limit: height of a sharp crest that a sweep will show with 95 % probability, m; None: the noise is not known.
+        stopped: why the survey would not come to its end, and what to do; a sentence, "" if it does.
     """
 
     base: Base
@@ -94,10 +97,17 @@ class DryRun:
     detail: DetailTime | None = None
     mesh: str = ""
     limit: float | None = None
+    stopped: str = ""
+
+    @property
+    def short(self) -> bool:
+        """True if a run by this plan would end as incomplete."""
+        return bool(self.stopped) or (self.account is not None and self.account.short)
 
     def record(self) -> dict[str, Any]:
         """The plan in JSON values: SI units."""
         return {
+            "stopped": self.stopped or None,
             "mesh": self.mesh,
             "sweeps": sum(move.purpose == "sweep" for move in self.moves),
             "moves": [{"purpose": move.purpose, "path": move.path.tolist()} for move in self.moves],
@@ -123,25 +133,27 @@ class DryRun:
     def lines(self) -> list[str]:
         """The plan in words."""
         sweeps = count_text(sum(move.purpose == "sweep" for move in self.moves), "sweep")
-        first = (
-            f"{sweeps} at {1e3 * self.speed:.3g} mm/s, {length_text(self.metres)} of finger path, "
-            f"{seconds_text(self.seconds)}"
-        )
-        broken = [f"move {number}: {what}" for number, what in self.violations]
+        if self.pecking is None:
+            pace, time = f" at {1e3 * self.speed:.3g} mm/s", seconds_text(self.seconds)
+        else:
+            pace, time = "", f"pecking takes it about {seconds_text(self.pecking)}, ways included"
+        first = f"{sweeps}{pace}, {length_text(self.metres)} of finger path, {time}"
+        broken = [f"move {number}: {what}" for number, what in self.violations[:MOST_LISTED_MOVES]]
+        if (more_broken := len(self.violations) - MOST_LISTED_MOVES) > 0:
+            broken.append(f"and {count_text(more_broken, 'more such move')}; --json lists all")
         assumed = [self.assumed] if self.assumed else []
         account = [] if self.account is None else [self.account.sentence()]
         warning = [self.account.warning()] if self.account is not None and self.account.warning() else []
-        told = [] if self.pecking is None else [f"pecking takes it about {seconds_text(self.pecking)}, ways included"]
         more = [] if self.detail is None else [self.detail.sentence()]
         mesh = [f"the mesh: {self.mesh}"] if self.mesh else []
-        before = [*warning, *mesh, *assumed]
+        before = [*([self.stopped] if self.stopped else []), *warning, *mesh, *assumed]
         shown = []
         if self.limit is not None:
             crest = (
                 f"A sharp crest {length_text(self.limit, 2)} high or higher is seen with 95 % where a sweep crosses it."
             )
             shown = [f"{crest} {groove_sentence(self.limit, self.tip_radius)}"]
-        return [*before, first, *more, *told, *shown, *account, *(broken or ["no move breaks a limit"])]
+        return [*before, first, *more, *shown, *account, *(broken or ["no move breaks a limit"])]
 
     def picture(self) -> bytes:
         """PNG of the base with the planned sweeps on it."""
@@ -203,10 +215,7 @@ def _planned(scene: Scene, finger: Finger, stages: Stages) -> DryRun:
             _, outcome = drive(exploring, carried, check=check, empty=planned.nothing)
         surveyed = outcome.value is not None and outcome.value.surveyed
         ended = outcome.detail if outcome.reason != "budget" else ""
-    if not surveyed:
-        short = "the time budget ends before the survey does: raise explore.time_budget or survey.smallest_feature"
-        short = f"the survey does not come to its end: {ended}" if ended else short
-        assumed = f"{assumed}; {short}" if assumed else short
+    stopped = "" if surveyed else f"the survey would not come to its end: {ended or _too_short(scene, planned)}"
     broken = {number - 1: what for number, what in violations}
     sound = [move for number, move in enumerate(moves) if number not in broken]
     refused = [(moves[number], what) for number, what in broken.items()]
@@ -228,7 +237,17 @@ def _planned(scene: Scene, finger: Finger, stages: Stages) -> DryRun:
         detail,
         "" if planned.given is None else mesh_text(planned.given.surface),
         scene.expected_limit,
+        stopped,
     )
+
+
+def _too_short(scene: Scene, planned: Explorer) -> str:
+    """That the time budget ends before the survey, and how much would do, as far as that is foretold."""
+    if planned.given is None:
+        why = f"the time budget of {seconds_text(scene.explore.time_budget)} ends before it"
+    else:
+        why = foretold_survey(scene, planned.given)[1]
+    return f"{why}; raise explore.time_budget or survey.smallest_feature"
 
 
 def _rehearsed(scene: Scene, planned: Explorer, base: Base, finger: SimulatedFinger) -> DetailTime | None:

@@ -152,6 +152,8 @@ def cause(error: BaseException) -> str:
         return "interrupted (Ctrl-C)"
     if isinstance(error, SystemExit) and isinstance(error.code, int) and error.code > SIGNAL_EXIT:
         return f"terminated ({signal.Signals(error.code - SIGNAL_EXIT).name})"
+    if isinstance(error, OSError) and error.filename and error.strerror:
+        return f"{error.filename}: {error.strerror}"  # without its number
     return " ".join(str(error).split()) or type(error).__name__
 
 

@@ -75,7 +75,7 @@ class Inspection:
         lines = [f"{self.path}: {self.kind}, {self.size:,} bytes"]
         for number, column in enumerate(self.columns[:MOST_LISTED_COLUMNS], 1):
             unit = f" [{column['unit']}]" if column["unit"] else ""
-            values = "" if column["least"] is None else f", {column['least']:.8g} to {column['greatest']:.8g}"
+            values = "" if column["least"] is None else f", {_number(column['least'])} to {_number(column['greatest'])}"
             missing = f", {column['missing']} missing" if column["missing"] else ""
             lines.append(f"  column {number}: {column['name'] or 'no name'}{unit}{values}{missing}: {column['is']}")
         if len(self.columns) > MOST_LISTED_COLUMNS:
@@ -87,8 +87,8 @@ class Inspection:
             unit = "" if self.metres else " (unit not stated)"
             lines.append(f"samples: {self.samples:,} in {count_text(self.sweeps, 'sweep')}; extent {extent}{unit}")
             lines.append(
-                f"spacing: {length(self.spacing)}; {self.gaps} gaps longer than {SAMPLE_GAP:g} spacings, "
-                f"{self.duplicates} repeated positions"
+                f"spacing: {length(self.spacing)}; {count_text(self.gaps, 'gap')} longer than {SAMPLE_GAP:g} spacings, "
+                f"{count_text(self.duplicates, 'repeated position')}"
             )
         if self.tip_radius is not None:
             lines.append(f"tip radius: {length_text(self.tip_radius)}")
@@ -199,7 +199,7 @@ class _Column:
         texts, some = text.texts.get(index), np.isfinite(self.last)
         moves = self.up + self.down
         habit = "goes up and down" if self.up and self.down else "advances" if moves else "constant"
-        habit += f" ({self.down / moves:.0%} of the steps down)" if self.up and self.down else ""
+        habit += _downwards(self.down / moves) if self.up and self.down else ""
         return {
             "name": text.names[index],
             "unit": text.units[index],
@@ -301,4 +301,14 @@ def _habit(values: FloatArray) -> str:
     back = float((steps < 0).mean()) if len(steps) else 0.0
     if back == 0.0 or (steps <= 0).all():
         return f"goes {'down' if back else 'up'}, and stands between" + more
-    return f"goes up and down ({back:.0%} of the steps down)" + more
+    return f"goes up and down{_downwards(back)}" + more
+
+
+def _downwards(share: float) -> str:
+    """Which share of a column's steps goes down, in words."""
+    return f" ({100.0 * share:.0f} % of the steps down)"
+
+
+def _number(value: float) -> str:
+    """A number as a table has it; zero has no sign."""
+    return f"{value + 0.0:.8g}"

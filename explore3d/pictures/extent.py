@@ -84,4 +84,4 @@ def _end(panel: Panel, feature: Feature, end: int, direction: float, place: tupl
 
 def _worst(feature: Feature, sd: FloatArray) -> str:
     widest = length_text(NORMAL_QUANTILE_95 * float(sd.max()), 2)
-    return f"{feature.length.text()[0]} long, known across to ±{widest} at its worst"
+    return f"{feature.length.text()[0]} long, ±{widest} across at worst"

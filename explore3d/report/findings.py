@@ -59,7 +59,8 @@ def summary(analysis: Analysis) -> list[str]:
     lines = ["no features were looked for" if refused else looked]
     account = analysis.account
     if features:
-        lines[0] += f", {finer} of them finer than the tip of {length_text(analysis.trace.tip_radius)}"
+        tip = length_text(analysis.trace.tip_radius)
+        lines[0] += f", {_finer_text(finer, numbers_found(features))} the tip of {tip}"
     lines = [*read_lines(analysis), *lines]
     if analysis.recovered:
         lines.append(analysis.recovered)
@@ -82,6 +83,14 @@ def summary(analysis: Analysis) -> list[str]:
         *[line for line in warnings(analysis) if line not in told],
         *([account.sentence()] if account is not None else []),
     ]
+
+
+def _finer_text(finer: int, found: Sequence[int]) -> str:
+    """ "finer than", "none of them finer than", "3 of them finer than": of how many there are, or may be."""
+    if found == [1]:
+        return "finer than" if finer else "gentler than"
+    share = "none" if not finer else "all" if found == [finer] else str(finer)
+    return f"{share} of them finer than"
 
 
 def read_lines(analysis: Analysis) -> list[str]:
@@ -259,8 +268,8 @@ def tip_sentence(analysis: Analysis) -> list[str]:
     if not provenance.get("tip_sd_assumed"):
         return []
     return [
-        f"The tip's radius is {length_text(radius)} as stated; how far that can be trusted nobody stated (--tip-sd "
-        f"does): ± {length_text(sd, 2)} ({100 * sd / radius:.2g} %) is assumed. Widths and heights carry that doubt."
+        f"The tip's radius is {length_text(radius)} as stated. How well it is known was not stated (--tip-sd states "
+        f"it): ± {length_text(sd, 2)} ({100 * sd / radius:.2g} %) is assumed. Widths and heights carry that doubt."
     ]
 
 

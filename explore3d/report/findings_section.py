@@ -153,11 +153,14 @@ def _counts(analysis: Analysis) -> Html:
     if not features:
         return paragraph("No detail stands out of the noise.")
     finer = sum(feature.curvature_feature for feature in features)
-    intro = paragraph(
-        f"{_capital(count_text(len(features), 'detail'))} {'stands' if len(features) == 1 else 'stand'} out of the "
-        f"noise: {finer} finer than the tip (curvature features, the paper's definition 1), {len(features) - finer} "
-        "gentler than the tip."
-    )
+    gentler, definition = len(features) - finer, "finer than the tip (curvature features, the paper's definition 1)"
+    if gentler == 0 or finer == 0:
+        how = definition if finer else "gentler than the tip (no curvature features, the paper's definition 1)"
+        how = f"all {how}" if len(features) > 1 else how.replace("features", "feature")
+    else:
+        how = f"{finer} {definition}, {gentler} gentler than the tip"
+    stands = "stands" if len(features) == 1 else "stand"
+    intro = paragraph(f"{_capital(count_text(len(features), 'detail'))} {stands} out of the noise: {how}.")
     if len(analysis.tip_counts) < 2:
         return intro
     rows = [(length_text(each.tip_radius), str(each.finer), str(each.gentler)) for each in analysis.tip_counts]

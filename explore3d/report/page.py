@@ -91,7 +91,7 @@ th { position: sticky; top: 0; background: var(--wash); text-align: left; font-w
   white-space: nowrap; }
 thead td { background: var(--wash); }
 th, td { padding: .5rem .7rem; border-bottom: 1px solid var(--faint); vertical-align: top; }
-tr:last-child td { border-bottom: 0; }
+tbody tr:last-child td { border-bottom: 0; }
 td.number, th.number { text-align: right; white-space: nowrap; }
 td b, td span, td small { white-space: nowrap; } td small.note { white-space: normal; min-width: 9rem; }
 td small { display: block; color: var(--soft); font-size: .82rem; }

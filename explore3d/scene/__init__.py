@@ -31,7 +31,11 @@ if TYPE_CHECKING:
         MachineTable as MachineTable,
         OptoForceTable as OptoForceTable,
     )
-    from explore3d.scene.mesh_files import load_mesh as load_mesh, mesh_text as mesh_text
+    from explore3d.scene.mesh_files import (
+        extent_text as extent_text,
+        load_mesh as load_mesh,
+        mesh_text as mesh_text,
+    )
     from explore3d.scene.scene import (
         Scene as Scene,
         load_scene as load_scene,
@@ -70,7 +74,7 @@ _PUBLIC = {
         "Setting",
     ),
     "machine": ("EMULATOR", "MIDDLE_OF_TRAVEL", "LineSensorTable", "MachineTable", "OptoForceTable"),
-    "mesh_files": ("load_mesh", "mesh_text"),
+    "mesh_files": ("extent_text", "load_mesh", "mesh_text"),
     "scene": ("Scene", "load_scene", "parse_scene", "recorded_scene"),
     "settings": ("AnalysisSettings",),
     "simulated": ("SimulatedFingerTable",),

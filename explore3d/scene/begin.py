@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from explore3d import MeshFileError, parse_length
+from explore3d import MeshFileError, UnitError, parse_length, unit_factor
 from explore3d.scene.examples import SCENE_FILE, refuse_to_replace
 from explore3d.scene.machine import EMULATOR, MIDDLE_OF_TRAVEL
 from explore3d.scene.scene import parse_scene
@@ -90,8 +90,11 @@ def begin_scene(
     """
     if not mesh.is_file():
         raise MeshFileError(f"{mesh}: {'a folder, not a mesh file' if mesh.is_dir() else 'no such mesh file'}")
-    path = folder / SCENE_FILE
-    smallest = SMALLEST[finger] * parse_length(tip_radius)
+    path, radius = folder / SCENE_FILE, parse_length(tip_radius)
+    if not radius > 0:
+        raise UnitError(f"tip_radius: should be greater than 0; found {tip_radius!r}")
+    unit_factor(units)
+    smallest = SMALLEST[finger] * radius
     values = {"mesh": _quoted(mesh.name), "units": _quoted(units), "white": _quoted(f"{1e6 * smallest / 10.0:.3g} um")}
     origin = f"[{', '.join(map(_quoted, MIDDLE_OF_TRAVEL))}]"
     values |= {"port": _quoted(port), "origin": origin, "touched": "", "pace": ""}

@@ -59,12 +59,16 @@ def checked_mesh(path: Path | str, surface: Surface) -> Surface:
     return surface
 
 
+def extent_text(surface: Surface) -> str:
+    """The sides of the box about a surface, "100 mm x 60 mm x 5 mm"."""
+    return " x ".join(length_text(float(size)) for size in np.ptp(surface.vertices, axis=0))
+
+
 def mesh_text(surface: Surface) -> str:
     """What a mesh is, in words by which a wrong unit, a hole and doubled faces are noticed; one line."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    extent = " x ".join(length_text(float(size)) for size in np.ptp(surface.vertices, axis=0))
     ways = np.sort(np.concatenate([surface.faces[:, pair] for pair in ([0, 1], [1, 2], [2, 0])]), axis=1)
     edges, faces = np.unique(ways, axis=0, return_counts=True)
     border, shared = edges[faces == 1], int((faces > 2).sum())
@@ -75,7 +79,7 @@ def mesh_text(surface: Surface) -> str:
         graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(corners), len(corners)))
         state = f"open, with {count_text(int(connected_components(graph)[0]), 'border')}"
     crowded = f"; {count_text(shared, 'edge')} with more than two faces" if shared else ""
-    return f"{extent}, {count_text(len(surface.faces), 'face')}, {state}{crowded}"
+    return f"{extent_text(surface)}, {count_text(len(surface.faces), 'face')}, {state}{crowded}"
 
 
 def _no_body(vertices: np.ndarray, faces: np.ndarray) -> str:

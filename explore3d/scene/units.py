@@ -80,7 +80,8 @@ def unit_factor(unit: str, dimension: str = "length") -> float:
         if unit in names:
             raise UnitError(f"{unit!r} is a unit of {other}, not of {dimension}; possible: {', '.join(units)}")
     # one letter off in a unit of two is no close match by length, yet the likeliest slip
-    near = [name for name in units if _one_key_off(unit, name)] or get_close_matches(unit, units, n=1)
+    near = [name for name in units if name.lower() == unit.lower()]
+    near = near or [name for name in units if _one_key_off(unit, name)] or get_close_matches(unit, units, n=1)
     hint = f" did you mean {' or '.join(map(repr, near))}?" if near else ""
     raise UnitError(f"unknown unit of {dimension} {unit!r};{hint} possible: {', '.join(units)}")
 
@@ -133,14 +134,21 @@ def _example(dimension: str) -> str:
     return f'a {dimension} like "1 {_usual(dimension)}" or a number in {SI[dimension]}'
 
 
+# s; from so many on, durations are told in days, and in years
+DAY, YEAR = 86400.0, 365.25 * 86400.0
+LONG_IN_DAYS, LONG_IN_YEARS = 4.0, 2.0
+
+
 def seconds_text(seconds: float) -> str:
-    """A duration: "12 ms", "3.4 s", "2 min 05 s"."""
+    """A duration: "12 ms", "3.4 s", "2 min 05 s", "3 h 20 min", "12 days", "8 years"."""
     if not math.isfinite(seconds):
         return UNKNOWN_TEXT
     if seconds < 0.0995:
         return f"{1e3 * seconds:.2g} ms" if seconds >= 1e-4 else "under 0.1 ms"
     if seconds < 99.5:
         return f"{seconds:.3g} s" if seconds < 9.95 else f"{seconds:.0f} s"
+    if seconds >= LONG_IN_DAYS * DAY:
+        return f"{seconds / DAY:.0f} days" if seconds < LONG_IN_YEARS * YEAR else f"{seconds / YEAR:,.0f} years"
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes} min {rest:02d} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
 

@@ -19,6 +19,8 @@ from multiprocessing import get_context
 from time import perf_counter
 from typing import Any
 
+from explore3d import count_text
+
 EPS = 2.0**-52
 # Roundings that add up along a computation: a case may lose so many units in the last place.
 SLACK = 64.0
@@ -201,7 +203,8 @@ def summary(rows: Sequence[Row]) -> str:
     spare = min((digits(row.answer.error) - digits(min(row.allowed, 1.0)) for row in numeric), default=nan)
     closest = "" if isnan(spare) else f" (closest: {spare:.1f} digits to spare)"
     end = f"fails: {'; '.join(failed)}" if failed else f"none fails{closest}"
-    return f"stability: {len(rows)} cases, {len(failed)} failed, {crashed} crashed, slowest {slowest:.1f} s; {end}"
+    counts = f"{count_text(len(rows), 'case')}, {len(failed)} failed, {crashed} crashed"
+    return f"stability: {counts}, slowest {slowest:.1f} s; {end}"
 
 
 def _pool() -> ProcessPoolExecutor:

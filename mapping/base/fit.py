@@ -100,7 +100,8 @@ def fit_base(
         TraceError: fewer than three samples, or all samples in one place.
     """
     if len(trace) < 3 or not np.ptp(trace.centers, axis=0).any():
-        raise TraceError(f"a base needs at least three samples in different places; found {len(trace)} samples")
+        found = f"{len(trace)} sample{'s' * (len(trace) != 1)}"
+        raise TraceError(f"a base needs at least three samples in different places; found {found}")
     frame = profile_frame(trace)
     if frame is not None:
         surface, parameters = fit_profile(trace, frame, form)

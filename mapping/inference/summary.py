@@ -102,7 +102,12 @@ def _describe_line(problem: PosteriorProblem, shape: LineShape, posterior: Poste
         width=section.width,
         length=length,
         position_sd=float(np.sqrt(courses.var(axis=0).mean())),
-        notes=(*problem.feature.notes, *notes, *([section.note] if section.note else [])),
+        # what assembly said of an end that the posterior speaks of is not said twice
+        notes=(
+            *(each for each in problem.feature.notes if not (notes and each.startswith(RUNS_ON))),
+            *notes,
+            *([section.note] if section.note else []),
+        ),
         details=replace(problem.feature.details, **section.details, **known),
     )
 
@@ -202,6 +207,8 @@ UNSEEN = 3.0
 # and the one that is denied is told
 PLACES_OF_END = 200
 GOES_ON = "the axis goes on beyond what was explored"
+# What assembly says of a line by where its crossings end; the posterior says it of each end
+RUNS_ON = "runs on where nothing was inspected"
 
 
 def explored(problem: PosteriorProblem, best: FloatArray) -> tuple[bool, bool]:

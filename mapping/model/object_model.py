@@ -99,6 +99,10 @@ class ObjectModel:
                 return feature
         raise KeyError(f"no feature {name!r}; possible: {', '.join(each.id for each in self.features) or 'none'}")
 
+    def __contains__(self, name: object) -> bool:
+        """True of the name of a feature, as for `model[name]`, and of a feature itself."""
+        return any(name == feature.id or name is feature for feature in self.features)
+
     def __iter__(self) -> Iterator[Feature]:
         return iter(self.features)
 

@@ -75,6 +75,18 @@ class Survey:
         """What is to be inspected: the base's surface, or its part in the region and on the sides; None if none."""
         return asked_part(self.base.surface, self.region, self.sides)
 
+    @property
+    def foretold_path(self) -> float:
+        """Length of all sweeps before any is laid out, m: the area over the width that each line of it answers for.
+
+        Of a body that can be reached everywhere that is what the sweeps come to, but for their ends.
+        """
+        if self.surface is None:
+            return 0.0
+        slices = self.crossed(self.visible)
+        lines_per_metre = 1.0 / self.pitch if slices is None else len(slices.axes) / slices.pitch
+        return float(self.surface.face_areas.sum() * lines_per_metre)
+
     def plan(self) -> Plan:
         """Yield every sweep; the outcome's value is the planned Coverage."""
         touched: list[FloatArray] = []

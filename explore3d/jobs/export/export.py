@@ -75,7 +75,8 @@ def may_be_written(source: Path | str, *targets: Path | str, overwrite: bool = F
         overwrite: files that are there may be replaced.
 
     Raises:
-        UserError: a name that says no form or is given twice, a package that is missing, a file that would be lost.
+        UserError: a name that says no form or is given twice, a package or a folder that is missing, a file that
+            would be lost.
     """
     paths = [Path(each) for each in targets]
     for path in paths:
@@ -91,6 +92,8 @@ def may_be_written(source: Path | str, *targets: Path | str, overwrite: bool = F
         package, install = FORMS[path.suffix]
         if package and find_spec(package) is None:
             raise UserError(f"{path}: needs {package}, and nothing was written; install it: {install}")
+        if not path.parent.is_dir():
+            raise UserError(f"{path}: there is no folder {path.parent}; make it first")
         _nothing_lost(Path(source), path, overwrite)
 
 

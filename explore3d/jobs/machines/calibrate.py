@@ -21,7 +21,7 @@ from explore3d.log import OUTCOME, LogWriter, read_log
 from explore3d.scene import Scene, scene_text
 from hw import Finger, Move
 from hw.probing import GrblFinger
-from mapping import Trace, length_text
+from mapping import Interval, Trace, length_text
 from mapping.geometry.mesh import write_whole
 from mapping.instrument import TipCalibration, calibrate_tip
 
@@ -53,16 +53,18 @@ class TipProfile:
 
     def lines(self) -> list[str]:
         """The same in words."""
-        tip, (low, high) = self.tip, self.tip.interval
+        tip, noise = self.tip, self.tip.noise
+        center = ", ".join(length_text(float(value), 2) for value in tip.center)
+        center_sd = ", ".join(length_text(float(value), 2) for value in tip.center_sd)
+        correlated = f", {length_text(noise.correlated)} correlated over {length_text(noise.length)}"
         lines = [
-            f"tip radius {1e3 * tip.radius:.4f} mm, 90 % between {1e3 * low:.4f} and {1e3 * high:.4f} mm",
-            f"centre {np.round(1e3 * tip.center, 4).tolist()} mm, sd {np.round(1e3 * tip.center_sd, 4).tolist()} mm",
-            f"noise {1e3 * tip.noise.white:.4f} mm white, {1e3 * tip.noise.correlated:.4f} mm correlated over "
-            f"{length_text(tip.noise.length)}",
-            f"largest mean deviation by direction {1e3 * float(np.abs(tip.deviations).max()):.4f} mm",
+            f"tip radius {Interval(tip.radius, *tip.interval)}, a 90 % interval",
+            f"centre of the sphere at ({center}), standard deviations {center_sd}",
+            f"noise of a sample {length_text(noise.white)} white{correlated if noise.correlated > 0.0 else ''}",
+            f"largest mean deviation by direction {length_text(float(np.abs(tip.deviations).max()), 2)}",
         ]
         if self.delay is not None:
-            lines.append(f"force sensor {1e3 * self.delay[0]:.2f} +- {1e3 * self.delay[1]:.2f} ms behind the stage")
+            lines.append(f"force sensor {1e3 * self.delay[0]:.2f} ± {1e3 * self.delay[1]:.2f} ms behind the stage")
         return lines
 
 

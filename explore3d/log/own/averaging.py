@@ -139,7 +139,9 @@ def about_averaging(
 def averaging_words(about: dict[str, Any]) -> str:
     """The same for people."""
     spacing = length_text(about["spacing"])
-    cut = f"cut at {count_text(about['cuts'], 'gap or end', 'gaps and ends')} and {count_text(about['turns'], 'turn')}"
+    cuts = (("cuts", "gap or end", "gaps and ends"), ("turns", "turn", "turns"))
+    places = " and ".join(count_text(about[key], one, several) for key, one, several in cuts if about[key])
+    cut = f"cut at {places}" if places else "cut nowhere"
     return (
         f"averaged: {about['samples']:,} samples are the means of {about['length']} each, {cut}; white noise falls to "
         f"{about['white_noise']:.3g} of it, what is correlated over more than {spacing} does not; crests lower than "

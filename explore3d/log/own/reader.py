@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from explore3d import EmptyLogError, UserError
+from explore3d import EmptyLogError, UserError, count_text
 from explore3d.log.own import format as log_format, point_cloud
 from explore3d.log.own.record import Event, Log, merge
 from mapping import FloatArray, Trace, TraceError
@@ -281,15 +281,17 @@ def _loss(reading: Reading, prefix: str = "") -> str:
     if reading.complete:
         return ""
     felt = sum(map(len, reading.felt))
-    parts = [f"recovered {reading.samples} samples of {reading.moves} moves"]
+    parts = [f"recovered {count_text(reading.samples, 'sample')} of {count_text(reading.moves, 'move')}"]
     parts += [f"{felt} of them of a move that was broken off"] if felt else []
     lost = reading.promised - reading.samples
     if lost > 0:
-        parts.append(f"{lost} further samples that the log announces are lost")
+        are = "is" if lost == 1 else "are"
+        parts.append(f"{count_text(lost, 'further sample')} that the log announces {are} lost")
     if reading.missing and lost <= 0:
-        parts.append(f"{reading.missing} messages are missing")
+        parts.append(f"{count_text(reading.missing, 'message')} {'is' if reading.missing == 1 else 'are'} missing")
     if reading.damaged:
-        parts.append(f"{reading.damaged} damaged chunks were left out")
+        was = "was" if reading.damaged == 1 else "were"
+        parts.append(f"{count_text(reading.damaged, 'damaged chunk')} {was} left out")
     if not reading.closed:
         cut = "in the middle of a chunk" if reading.cut else "after a whole chunk"
         parts.append(f"the log was never closed and ends {cut} (the program was killed, or the file was cut)")

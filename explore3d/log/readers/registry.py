@@ -54,6 +54,8 @@ def reader_of(path: Path) -> Reader:
     Raises:
         UserError: the file cannot be read.
     """
+    if path.name == LOG and path.parent.is_dir() and not path.exists():
+        raise UserError(f"{path.parent}: no session is in that folder: it holds no {LOG}")
     try:
         with path.open("rb") as file:
             first = file.read(FIRST_BYTES)

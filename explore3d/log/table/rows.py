@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import UNITS, UserError
+from explore3d import UNITS, UserError, count_text
 from explore3d.log.table.columns import LENGTH_ROLES, POSITION, VECTORS, label
 from explore3d.log.table.order import Order, clipped, cloud_order, profile_order, sentinels
 from explore3d.log.table.settings import TableSettings
@@ -82,7 +82,8 @@ def read_as(
             unit = text.units[index] if length_factor(text.units[index]) else f"{_unit_of(factors[role])} (as told)"
         names.append(f"{role} = {label(text, index)} {unit}".rstrip())
     sweeps = len(np.unique(trace.sweep[np.flatnonzero(np.diff(trace.sweep, prepend=trace.sweep[0] - 1))]))
-    parts = [*names, f"{len(trace)} rows in {sweeps} sweep{'s' * (sweeps != 1)}", *(short for _, short in dropped)]
+    rows = f"{count_text(len(trace), 'row')} in {count_text(sweeps, 'sweep')}"
+    parts = [*names, rows, *(short for _, short in dropped)]
     return "; ".join([", ".join(parts), *said])
 
 
@@ -262,7 +263,7 @@ def trace_of(values: Columns, settings: TableSettings, text: TableText, order: O
     x, z = values["x"], values["z"]
     profile = "y" not in values
     if profile and len(x) > 1 and not np.ptp(x) > 0:
-        raise UserError(f"{text.path}: field x: a profile needs x that advances; found {x[0]:g} m throughout")
+        raise UserError(f"{text.path}: field x: a profile needs x that advances; found the same in all {len(x)} rows")
     if settings.reference == "bottom":
         z = z + radius
     table = np.empty((len(x), 3))

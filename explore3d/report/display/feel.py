@@ -59,15 +59,15 @@ class Felt:
         lines = [f"{run.steps} steps, {run.reason}; {len(self.trace)} of them in contact"]
         if len(late) and late.any():
             lines.append(
-                f"late by {np.median(late):.1f} us in the middle, by {np.quantile(late, 0.999):.0f} us in 99.9 %, "
+                f"late by {np.median(late):.1f} µs in the middle, by {np.quantile(late, 0.999):.0f} µs in 99.9 %, "
                 f"by a period or more in {100.0 * np.mean(late > 1e6 * self.period):.2g} %; "
-                f"a step takes {np.median(computing):.1f} us, {np.quantile(computing, 0.999):.0f} us at most in 99.9 %"
+                f"a step takes {np.median(computing):.1f} µs, {np.quantile(computing, 0.999):.0f} µs at most in 99.9 %"
             )
         if run.lost:
             lines.append(f"{run.lost} records came too fast to be kept")
         least = float(run.column("energy").min()) if len(run.records) else 0.0
         lines.append(
-            f"force up to {force.max():.3g} N; energy made by the display: {1e6 * max(0.0, -least):.3g} uJ at most"
+            f"force up to {force.max():.3g} N; energy made by the display: {1e6 * max(0.0, -least):.3g} µJ at most"
         )
         lines += [f"not felt: {each.stage}, {each.reason}" for each in self.left_out]
         return lines
@@ -291,7 +291,7 @@ def live(model: ObjectModel) -> Callable[[FloatArray], bool]:
         bar = "#" * min(20, round(20.0 * force / 3.0))
         late = 1e6 * float(np.quantile(run.column("late"), 0.99))
         place = " ".join(f"{1e3 * each:8.2f}" for each in here)
-        print(f"\r{place} mm  {force:5.2f} N {bar:<20} {nearest:<12} late {late:5.0f} us", end="", file=sys.stderr)
+        print(f"\r{place} mm  {force:5.2f} N {bar:<20} {nearest:<12} late {late:5.0f} µs", end="", file=sys.stderr)
         return False
 
     return look

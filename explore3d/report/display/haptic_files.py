@@ -13,7 +13,7 @@ import numpy as np
 
 from explore3d import UserError
 from explore3d.report.display.vibration import EVENT_GAP, Vibration
-from mapping import FloatArray
+from mapping import FloatArray, length_text
 from mapping.geometry.mesh import write_whole
 
 # Full scale of 16 bit samples
@@ -42,8 +42,8 @@ def wav_bytes(vibration: Vibration, full_scale: float | None = None) -> bytes:
     scale = full_scale if full_scale is not None else max(vibration.amplitude, np.finfo(float).tiny)
     if vibration.amplitude > scale * (1.0 + 1e-12):
         raise UserError(
-            f"--full-scale: the vibration has {1e6 * vibration.amplitude:.3g} um to either side, the actuator "
-            f"{1e6 * scale:.3g} um; give more, or less exaggeration"
+            f"--full-scale: the vibration has {length_text(vibration.amplitude)} to either side, the actuator "
+            f"{length_text(scale)}; give more, or less exaggeration"
         )
     samples = np.round(FULL_SCALE_16_BIT * (vibration.height - middle) / scale).astype("<i2")
     stream = io.BytesIO()

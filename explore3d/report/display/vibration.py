@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from explore3d import UserError
-from mapping import FloatArray, ObjectModel
+from explore3d import UserError, count_text
+from mapping import FloatArray, ObjectModel, length_text
 from mapping.geometry.mesh import arclengths
 from mapping.geometry.proxy import ProxyBody, pressed_along
 from mapping.model import touchable
@@ -85,17 +85,18 @@ class Vibration:
         """What the terminal is told."""
         if self.amplitude <= PRESSING:
             return [
-                f"{self.duration:.3g} s, {len(self.height)} samples at {self.rate:g} Hz",
+                f"{self.duration:.3g} s, {len(self.height):,} samples at {self.rate:g} Hz",
                 "the path crosses no feature, and the fingertip feels nothing; features.csv says where they are",
             ]
         low, high = self.band()
         most = self.above_threshold()
         felt = f"{most:.3g} times" if most >= 1.0 else f"only {most:.2g} times"
         return [
-            f"{self.duration:.3g} s, {len(self.height)} samples at {self.rate:g} Hz, {len(self.events)} events",
-            f"amplitude {1e6 * self.amplitude:.3g} um, 90 % of the velocity's energy from {low:.3g} to {high:.3g} Hz",
+            f"{self.duration:.3g} s, {len(self.height):,} samples at {self.rate:g} Hz, "
+            f"{count_text(len(self.events), 'event')}",
+            f"amplitude {length_text(self.amplitude)}, 90 % of the velocity's energy from {low:.3g} to {high:.3g} Hz",
             f"at its strongest third of an octave it is {felt} what people feel "
-            f"({1e6 * float(human_threshold(np.array([BEST_FREQUENCY]))[0]):.2g} um at {BEST_FREQUENCY:g} Hz)",
+            f"({length_text(float(human_threshold(np.array([BEST_FREQUENCY]))[0]), 2)} at {BEST_FREQUENCY:g} Hz)",
         ]
 
 

@@ -69,15 +69,18 @@ class Form:
         """(N,) True of the samples that the base is fitted to.
 
         Raises:
-            FormError: the masks leave hardly anything.
+            FormError: there is hardly anything, or the masks leave it.
         """
         x = trace.centers[:, 0]
         keep = np.ones(len(x), dtype=bool)
         for low, high in self.masks:
             keep &= (x < low) | (x > high)
         if keep.sum() < FEWEST_SAMPLES:
-            asked = ", ".join(f"{low:g}..{high:g} m" for low, high in self.masks)
-            raise FormError(f"the masks {asked} leave {keep.sum()} samples; a base needs at least {FEWEST_SAMPLES}")
+            found = f"{len(keep)} sample{'s' * (len(keep) != 1)}"
+            if self.masks:
+                asked = ", ".join(f"{low:g}..{high:g} m" for low, high in self.masks)
+                found += f", of which the masks {asked} leave {keep.sum()}"
+            raise FormError(f"the base of a profile needs at least {FEWEST_SAMPLES} samples; found {found}")
         return keep
 
 
@@ -91,12 +94,14 @@ def _stretch(text: str) -> tuple[float, float]:
     except ValueError:
         ends = (0.0, 0.0)
     if not dots or not ends[0] < ends[1]:
-        raise FormError(f"mask {text!r} is no stretch in x; possible: FROM..TO with FROM below TO, say 1.2mm..1.4mm")
+        raise FormError(
+            f"mask {text!r} is no stretch in x; possible: FROM..TO with units, FROM below TO, say 1.2mm..1.4mm"
+        )
     return ends
 
 
 def _length(text: str) -> float:
-    """Metres of a text such as "0.8 mm" or "8e-4"; 0 if it is no length."""
+    """Metres of a text such as "0.8 mm"; 0 if it is no length with a unit."""
     try:
         value = _metres(text)
     except ValueError:
@@ -107,7 +112,9 @@ def _length(text: str) -> float:
 def _metres(text: str) -> float:
     text = text.strip()
     unit = next((u for u in sorted(UNITS_OF_LENGTH, key=len, reverse=True) if text.endswith(u)), "")
-    return float(text.removesuffix(unit)) * UNITS_OF_LENGTH.get(unit, 1.0)
+    if not unit:
+        raise ValueError(f"unit missing in {text!r}")  # 1..2 of a profile in mm would be metres
+    return float(text.removesuffix(unit)) * UNITS_OF_LENGTH[unit]
 
 
 def form_line(

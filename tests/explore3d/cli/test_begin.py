@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 import trimesh
 from in_process import explore3d_main
 
-from explore3d import MeshFileError
+from explore3d import MeshFileError, UserError
 from explore3d.jobs import plan_scene
 from explore3d.scene import begin_scene, copy_example, examples, load_scene
 
@@ -47,6 +48,38 @@ def test_nothing_is_written_over(
     assert explore3d_main(monkeypatch, "init", tmp_path, "--example", "wire_on_plate") == 2
     assert "wire_on_plate.ply: is there already" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["wire_on_plate.ply"]
+
+
+@pytest.mark.parametrize(
+    ("tip", "units", "said"),
+    [
+        ("-5 mm", "mm", "tip_radius: should be greater than 0; found '-5 mm'"),
+        ("0 mm", "mm", "tip_radius: should be greater than 0; found '0 mm'"),
+        ("5 mm", "MM", "unknown unit of length 'MM'; did you mean 'mm'?"),
+    ],
+)
+def test_what_is_wrong_with_an_option_is_said_of_that_option(tip: str, units: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=re.escape(said)):
+        begin_scene(tmp_path / "mine", MESHES / "tile.ply", units, tip)
+    assert not (tmp_path / "mine").exists()
+
+
+def test_a_unit_a_thousand_times_too_large_is_noticed_before_anything_is_planned(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    mesh = tmp_path / "plate.off"
+    trimesh.creation.box((100.0, 60.0, 5.0)).export(mesh)  # in mm, by its numbers
+    told = ["init", tmp_path / "mine", "--mesh", mesh, "--tip-radius", "5 mm", "--units"]
+    assert explore3d_main(monkeypatch, *told, "m") == 0
+    assert "the sweeps over 100 m x 60 m x 5 m take about 10 years" in capsys.readouterr().out
+    scene = tmp_path / "mine" / "scene.toml"
+    for command in (["plan", scene], ["run", scene, "--out", tmp_path / "out"]):
+        assert explore3d_main(monkeypatch, *command) == 2
+        said = capsys.readouterr().err
+        assert "scene.toml: model.units: the sweeps over 100 m x 60 m x 5 m" in said and "found 'm'" in said
+    assert not (tmp_path / "out").exists()
+    assert explore3d_main(monkeypatch, *told[:1], tmp_path / "right", *told[2:], "mm") == 0
+    assert "take about" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("finger", ["simulated", "grbl"])

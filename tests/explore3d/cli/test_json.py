@@ -60,7 +60,7 @@ def test_stability_has_a_record_of_each_case(told: Any) -> None:
     found = told("stability", "--only", "kink beside")
     (case,) = found["cases"]
     assert case["passed"] and 0.0 <= case["error"] <= case["allowed"] and "kink beside" in case["name"]
-    assert found["summary"].startswith("stability: 1 cases, 0 failed")
+    assert found["summary"].startswith("stability: 1 case, 0 failed")
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -150,9 +151,12 @@ def test_pecks_far_apart_leave_surface_between_them(tmp_path: Path) -> None:
     text = WIRE.with_name("grbl_peck.toml").read_text()
     swept = []
     for step in ("0.5 mm", "4 mm"):
-        account = planned(tmp_path, text.replace('step = "0.5 mm"', f'step = "{step}"')).account
-        assert account is not None
-        swept.append(account.swept)
+        plan = planned(tmp_path, text.replace('step = "0.5 mm"', f'step = "{step}"'))
+        assert plan.account is not None
+        swept.append(plan.account.swept)
+        # one time is told, that of the pecks, not that of sliding at the speed of the sweeps
+        (told,) = (line for line in plan.lines() if "of finger path" in line)
+        assert re.search(r"finger path, pecking takes it about .*, ways included$", told) and "mm/s" not in told
     assert swept[0] > 0.99 and swept[1] < 0.96
 
 
@@ -285,3 +289,18 @@ def test_noise_that_hides_what_was_asked_for_is_said_first(tmp_path: Path) -> No
     assert plan.account is not None and plan.account.hidden is not None and plan.account.hidden > 1e-4
     assert plan.lines()[0] == plan.account.warning()
     assert "noise" in plan.account.warning()
+
+
+def test_a_budget_that_ends_the_survey_is_said_first_with_what_it_would_take(tmp_path: Path) -> None:
+    plan = planned(tmp_path, TEXT.replace('time_budget = "10 min"', 'time_budget = "20 s"'))
+    assert plan.short and plan.account is None and plan.record()["stopped"] == plan.stopped == plan.lines()[0]
+    assert "take about 4 min 13 s at 30 mm/s" in plan.stopped and "the time budget is 20 s" in plan.stopped
+
+
+def test_of_many_moves_that_break_a_limit_some_are_told(tmp_path: Path) -> None:
+    plan = planned(tmp_path, TEXT.replace('time_budget = "10 min"', 'time_budget = "20 s"'))
+    many = replace(plan, violations=tuple((number, "too far") for number in range(1, 15)))
+    assert many.lines()[-1] == "and 4 more such moves; --json lists all"
+    assert sum(line.startswith("move ") for line in many.lines()) == 10 and len(many.record()["violations"]) == 14
+    few = replace(plan, violations=((1, "too far"),))
+    assert few.lines()[-1] == "move 1: too far"

@@ -7,6 +7,7 @@ import io
 import json
 import pickle
 import struct
+import warnings
 import zipfile
 from collections.abc import Mapping
 from importlib.metadata import EntryPoint
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from explore3d import UserError
+from explore3d import UserError, analyze
 from explore3d.log import Inspection, inspect, load_logs
 from explore3d.log.readers import readers, registry
 from mapping import Trace
@@ -225,6 +226,49 @@ def test_inspect_says_gaps_repeats_and_sentinels(tmp_path: Path) -> None:
     found = looked(tmp_path, "x [mm];z [mm]\n" + "\n".join([*rows, rows[-1]]) + "\n", tip_radius="1 mm")
     assert (found.gaps, found.duplicates, found.samples) == (1, 1, 39)
     assert "1 left out: z is -9999" in found.read_as and "far off" in found.columns[1]["is"]
+
+
+def test_inspect_counts_in_words_and_gives_zero_no_sign(tmp_path: Path) -> None:
+    said = "\n".join(looked(tmp_path, "x [mm];z [mm]\n0;-0\n0.5;-1\n1;-0.0\n2;-2\n").lines())
+    assert "-2 to 0:" in said and "-0" not in said.replace("-0.", "")
+    assert "no gaps longer than" in said and "no repeated positions" in said and "(67 % of the steps down)" in said
+    one = "\n".join(looked(tmp_path, "x [mm];z [mm]\n1;2\n").lines())
+    assert "1 row in 1 sweep" in one
+
+
+def test_what_has_one_row_is_refused_with_its_name(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"scan\.csv: .* found 1 sample$"):
+        analyze(written(tmp_path, b"x,z\n1,2\n", "scan.csv"), tip_radius="1 mm", units="mm")
+    four = written(tmp_path, b"x,z\n1,2\n2,2\n3,2.5\n4,2\n", "four.csv")
+    with pytest.raises(UserError, match=r"four\.csv: the base of a profile needs at least 8 samples; found 4 samples$"):
+        analyze(four, tip_radius="1 mm", units="mm")
+
+
+def test_a_folder_that_is_no_session_is_refused_as_that(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no session is in that folder: it holds no log"):
+        inspect(tmp_path)
+
+
+def test_a_profile_too_coarse_to_show_anything_is_analysed_without_a_raw_warning(tmp_path: Path) -> None:
+    x = np.arange(80) * 0.05
+    rows = "".join(f"{a:.3f},{z:.7f}\n" for a, z in zip(x, RNG.normal(0.0, 1e-6, 80), strict=True))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = analyze(written(tmp_path, f"x,z\n{rows}".encode(), "c.csv"), tip_radius="2 um", units="mm", quick=True)
+    assert not np.isfinite(found.detections.detection_limit)
+
+
+def test_a_program_is_told_which_setting_or_file_it_got_wrong_and_sees_a_result_in_a_line(tmp_path: Path) -> None:
+    path = written(tmp_path, CSV.encode(), "scan.csv")
+    with pytest.raises(TypeError, match="no setting 'unit' of a recording; did you mean 'units'"):
+        analyze(path, tip_radius="1 mm", unit="mm")
+    with pytest.raises(TypeError, match=r"the name of a file; found ndarray; numpy\.save"):
+        analyze(POINTS, tip_radius="1 mm")  # type: ignore[arg-type]
+    said = repr(analyze(path, tip_radius="1 mm", units="mm", quick=True))
+    assert said.startswith(
+        "<Analysis of 'scan.csv': <LaidTrace: 80 samples in 4 sweeps of a tip of 1 mm>, <ObjectModel"
+    )
+    assert "\n" not in said
 
 
 def test_inspect_as_json_is_json_and_as_text_is_lines(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,3 +39,16 @@ def test_the_picture_is_as_long_as_the_line_not_as_its_chord() -> None:
     assert picture is not None
     ticks = [float(each) for each in re.findall(r">(\d+)</text>", picture.decode())]
     assert max(ticks) == 30.0  # of 31.4 mm; the chord has 20
+
+
+def test_the_title_of_a_picture_fits_it() -> None:
+    feature = replace(half_circle(), length=Interval(123.456e-3, 123.4e-3, 123.5e-3, censored=True))
+    picture = extent_picture([feature], [None])
+    assert picture is not None
+    svg = picture.decode()
+    begin, size, title = re.findall(r'<text x="([\d.]+)" y="[\d.]+" font-size="([\d.]+)"[^>]*>(ridge-1: [^<]*)<', svg)[
+        0
+    ]
+    assert title.startswith("ridge-1: at least 123 mm long")
+    # a bold letter is 0.58 of the font's size wide on average (DejaVu Sans)
+    assert float(begin) + 0.58 * float(size) * len(title) < float(re.findall(r'width="([\d.]+)"', svg)[0])

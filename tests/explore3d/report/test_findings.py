@@ -135,6 +135,19 @@ def test_where_a_part_is_out_of_reach_the_share_is_of_the_rest() -> None:
     assert summary(told)[0] == "no features found on the 97 % of the surface that was swept"
 
 
+def test_how_many_are_finer_than_the_tip_is_said_in_words() -> None:
+    size = Interval(1e-3, 0.9e-3, 1.1e-3)
+
+    def first(*finer: bool) -> str:
+        return summary(analysis(*(feature(f"bump-{k}", each, size) for k, each in enumerate(finer))))[0]
+
+    assert first(True) == "1 feature found, finer than the tip of 10 mm"
+    assert first(False) == "1 feature found, gentler than the tip of 10 mm"
+    assert first(False, False) == "2 features found, none of them finer than the tip of 10 mm"
+    assert first(True, True) == "2 features found, all of them finer than the tip of 10 mm"
+    assert first(True, False) == "2 features found, 1 of them finer than the tip of 10 mm"
+
+
 def test_each_feature_has_a_line_with_its_intervals() -> None:
     found = analysis(
         feature("ridge-1", True, Interval(80e-3, 79.9e-3, 80.1e-3)),
@@ -226,5 +239,5 @@ def test_a_doubt_of_the_tip_that_was_assumed_is_said() -> None:
     found = analysis()
     found.model.provenance = {"tip_sd_assumed": True, "tip_sd": 1e-4}
     said = summary(found)[-1]
-    assert said.startswith("The tip's radius is 10 mm as stated; how far that can be trusted nobody stated")
+    assert said.startswith("The tip's radius is 10 mm as stated. How well it is known was not stated")
     assert "± 0.1 mm (1 %) is assumed" in said

@@ -89,12 +89,18 @@ def test_an_interval_has_no_more_digits_than_are_known() -> None:
     assert depth.text() == ("between -0.43 and -0.42 mm", "")
 
 
+def test_a_bound_that_rounds_to_zero_has_no_sign() -> None:
+    assert Interval(5e-4, -1e-6, 1e-3).text() == ("0.50 mm", "0.00 to 1.00")
+
+
 def test_durations_and_counts_read_as_speech() -> None:
-    assert [seconds_text(v) for v in (0.012, 3.456, 42.0, 125.0, 7300.0)] == [
+    assert [seconds_text(v) for v in (0.012, 3.456, 42.0, 125.0, 7300.0, 1e6, 3e8)] == [
         "12 ms",
         "3.46 s",
         "42 s",
         "2 min 05 s",
         "2 h 01 min",
+        "12 days",
+        "10 years",
     ]
     assert [count_text(n, "ridge") for n in (0, 1, 2)] == ["no ridges", "1 ridge", "2 ridges"]

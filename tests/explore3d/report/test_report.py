@@ -75,7 +75,7 @@ def test_the_page_says_what_was_found_and_what_was_left_out(folder: Path) -> Non
     for sentence in (
         "1 ridge was found.",
         "0.650 mm (0.634 to 0.666) high",
-        "1 finer than the tip",
+        "1 detail stands out of the noise: finer than the tip",
         "1 of 1 features found, 0 missed, 0 invented",
         "the global model was given",
         "A sharp crest 40 µm high or higher is seen with 95 % probability",

@@ -76,7 +76,7 @@ def test_no_quick_case_fails(group):
 def test_the_command_writes_page_and_table_and_ends_with_a_summary(tmp_path):
     result = CliRunner().invoke(command_line(), ["stability", "--only", "kink beside", "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
-    assert result.output.splitlines()[-1].startswith("stability: 1 cases, 0 failed")
+    assert result.output.splitlines()[-1].startswith("stability: 1 case, 0 failed")
     assert "printed form" in (tmp_path / "stability.html").read_text()
     assert len((tmp_path / "stability.csv").read_text().splitlines()) == 2
 

@@ -79,6 +79,12 @@ def test_features_get_names_by_kind_in_their_order() -> None:
     assert [feature.id for feature in model().features] == ["ridge-1", "bump-1", "bump-2"]
 
 
+def test_a_name_is_in_a_model_that_answers_to_it() -> None:
+    known = model()
+    assert all(each.id in known and each in known for each in known) and len(known) > 0
+    assert "ridge-9" not in known and 1 not in known
+
+
 def test_the_anchor_says_where_on_the_mesh_the_middle_of_the_axis_lies() -> None:
     where = model().features[0].anchor
     assert where is not None

@@ -1,5 +1,6 @@
 """Models, features and posteriors draw themselves with matplotlib: what is on the axes is what they hold."""
 
+import itertools
 from dataclasses import replace
 
 import matplotlib
@@ -55,9 +56,14 @@ def test_a_feature_shows_each_size_with_its_interval() -> None:
 
 
 def test_a_posterior_has_a_panel_for_each_parameter() -> None:
-    draws = np.random.default_rng(1).normal([1.0, 2.0, 3.0, 4.0, 5.0], 0.1, (300, 5))
+    draws = np.random.default_rng(1).normal([0.6533e-3, 2.0e-3, 0.0, 4.0, 5.0], [3e-6, 1e-4, 1e-5, 0.1, 0.1], (300, 5))
     names = ("height", "width", "x", "angle", "end")
     figure = Posterior(names, ("m", "m", "m", "rad", ""), draws, 1.0, 0.3, "converged").plot()
-    assert [each.get_xlabel() for each in figure.axes] == ["height (m)", "width (m)", "x (m)", "angle (rad)", "end"]
+    assert [each.get_xlabel() for each in figure.axes] == ["height (mm)", "width (mm)", "x (µm)", "angle (rad)", "end"]
     median = figure.axes[2].lines[0].get_xdata()[0]
-    assert median == pytest.approx(np.median(draws[:, 2]))
+    assert median == pytest.approx(1e6 * np.median(draws[:, 2]))
+    figure.canvas.draw()
+    for axes in figure.axes:  # no number runs into the next one
+        boxes = [each.get_window_extent() for each in axes.get_xticklabels() if each.get_text() and each.get_visible()]
+        boxes = [box for box in boxes if axes.bbox.x0 <= 0.5 * (box.x0 + box.x1) <= axes.bbox.x1]
+        assert all(one.x1 < other.x0 for one, other in itertools.pairwise(boxes))

@@ -64,6 +64,13 @@ def test_sweeps_of_a_plate_run_along_its_long_side_a_pitch_apart_and_turn_round_
     assert (directions[1:] == -directions[:-1]).all()
 
 
+@pytest.mark.parametrize("surface", [plate(), cylinder()])
+@pytest.mark.parametrize("shortest_ridge", [None, 0.05])
+def test_the_length_of_all_sweeps_is_foretold_by_the_area(surface: Surface, shortest_ridge: float | None) -> None:
+    plan = Survey(base=Base(surface), tip_radius=R, smallest=3e-4, shortest_ridge=shortest_ridge)
+    assert sum(line.length for line in plan.lines()) == pytest.approx(plan.foretold_path, rel=0.25)
+
+
 def test_every_point_between_two_sweeps_still_sees_the_asked_share_of_the_smallest_feature() -> None:
     plan = survey(plate(), smallest=5e-4)
     height_halfway = plan.smallest - (plan.pitch / 2) ** 2 / (2 * R)

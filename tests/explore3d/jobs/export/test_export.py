@@ -59,6 +59,7 @@ def test_nothing_is_written_where_one_of_the_targets_cannot_be(
         (tmp_path / "p.dxf", "needs no_such_package"),
         (there, "is there already"),
         (tmp_path / "p.png", "its name says no form"),
+        (tmp_path / "absent" / "p.qif", "there is no folder"),
         (good, "is given twice"),
     ):
         assert explore3d_main(monkeypatch, "export", out, "--to", good, "--to", bad) == 2

@@ -29,6 +29,9 @@ def test_the_simulated_tip_is_found_within_its_interval_and_written_as_a_profile
     # the flat faces of the sphere's mesh lie up to 2 um inside it
     assert profile.tip.radius == pytest.approx(0.01, abs=3.0 * profile.tip.radius_sd + 2e-6)
     assert profile.tip.noise.white == pytest.approx(5e-5, rel=0.05)
+    radius, center, noise, deviation = profile.lines()
+    assert radius.startswith("tip radius 9.99") and radius.endswith("), a 90 % interval")
+    assert " 0.0" not in noise and "-0.0," not in center and "µm" in deviation  # each in a unit that shows its digits
     write_profile(profile, tmp_path / "tip.toml")
     kept = tomllib.loads((tmp_path / "tip.toml").read_text())
     assert kept["radius"] == profile.tip.radius and kept["schema"] == "explore3d/tip/1"

@@ -208,7 +208,7 @@ def test_a_simulated_hand_feels_the_wire_and_the_log_says_so(tmp_path: Path) -> 
     assert np.array_equal(trace.centers, felt.trace.centers) and trace.tip_radius == R
     x, _, z = trace.centers.T
     assert np.abs(z - R - cap_height(x, HEIGHT, 0.5 * HEIGHT, R)).max() < 1e-8
-    assert "energy made by the display: 0 uJ" in "\n".join(felt.lines())
+    assert "energy made by the display: 0 µJ" in "\n".join(felt.lines())
 
 
 def test_a_finger_explores_what_is_displayed() -> None:
