@@ -20,6 +20,7 @@ from mapping.estimate.deviation.blocks import (
 )
 from mapping.estimate.deviation.drift import Drift, SteadyDrift, drift
 from mapping.estimate.deviation.evidence import Fit, Whitened, best_fit, every_law, whitened
+from mapping.estimate.deviation.facets import round_out
 from mapping.estimate.deviation.fields import RigidFrame, SmoothField, spread
 from mapping.estimate.deviation.on_details import unexplained
 from mapping.estimate.deviation.parts import DEEP, departure, parts_of
@@ -101,7 +102,8 @@ def explain(
 ) -> Deviation | None:
     """What is wrong with the model at long wavelengths; None if what was felt agrees with it.
 
-    The heights of blocks of half a tip radius over the model are explained by nothing, or by an offset, a pose, a
+    A mesh whose facets stand for something round is rounded out first (see `round_out`). The heights of blocks of half
+    a tip radius over the model are explained by nothing, or by an offset, a pose, a
     scale, an even drift, a smooth deformation, and all of them together, or by a line of each sweep's own: each a
     Gaussian field whose marginal likelihood has a closed form, under noise that is white and correlated along sweeps.
     Blocks beyond a steep place do not count: fine features are what is steep. The most probable explanation is
@@ -120,7 +122,10 @@ def explain(
     given, blocks = base, Blocks.of(LaidTrace.of(trace, base), metres)
     if len(blocks) < FEWEST_BLOCKS:
         return None
-    tip = trace.tip_radius
+    tip, rounded = trace.tip_radius, round_out(trace, base)
+    if rounded is not None:
+        given = base = rounded.base
+        blocks = Blocks.of(LaidTrace.of(trace, base), metres)
     level, level_gain = _common_level(blocks, base, tip)
     if abs(level) > OWN_DIAMETER * tip:
         return _out_of_reach(base, blocks, level, level_gain, tip)
@@ -159,7 +164,10 @@ def explain(
         seen = Blocks.of(LaidTrace.of(trace, now))
         parts = parts_of(seen, seen.height, seen.smooth_as_felt, tip, missed)
     deviation = _deviation(before, now, blocks, seen, found, lines, parts, tip)
-    if not found and not lines and not parts and not level and not deviation.beyond_repair:
+    if rounded is not None:
+        causes, gain = ("facets", *deviation.causes), deviation.gain or rounded.gain
+        deviation = replace(deviation, causes=causes, facets=rounded.bulge, gain=gain)
+    elif not found and not lines and not parts and not level and not deviation.beyond_repair:
         return None
     if not level:
         return deviation

@@ -12,7 +12,7 @@ from mapping.base import Base, LaidTrace
 from mapping.estimate.deviation.drift import Drift, SteadyDrift
 
 # What may be wrong with a model, or with the sweeps over it; a part is where the body departs from it alone and sharply
-CAUSES = ("offset", "pose", "scale", "deformation", "drift", "part")
+CAUSES = ("facets", "offset", "pose", "scale", "deformation", "drift", "part")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +72,7 @@ class Deviation:
         left: of what remains of them, m.
         gain: logarithm of how much more probable the heights are than without a deviation.
         heights: (V,) departure at each vertex of `base`, m, positive where the body stands out of its model.
+        facets: largest height of the round body over the facets that stand for it in the mesh, m; 0 if they are flat.
         unexplained: share of the felt surface that stands off the corrected model, and not on details that stand on it.
         beyond_repair: whether nothing can be looked for; `offset` is then by how much it lies off, not corrected.
         facing: (3,) unit direction that the felt side of the model faces, where an offset of a quarter of a tip radius
@@ -96,6 +97,7 @@ class Deviation:
     unexplained: float
     beyond_repair: bool = False
     facing: FloatArray = field(default_factory=lambda: np.zeros(3))
+    facets: float = 0.0
 
     @property
     def of_the_model(self) -> bool:
@@ -136,6 +138,9 @@ class Deviation:
         if cause == "pose":
             off = length_text(float(np.linalg.norm(self.shift)), 2)
             return f"the object stands {off} and {np.degrees(self.turn):.2f} degrees off it: moved"
+        if cause == "facets":
+            over = length_text(self.facets, 2)
+            return f"its facets stand for a round body, which lies up to {over} over them: rounded out"
         if cause == "scale":
             size = "larger" if self.scale > 1.0 else "smaller"
             return f"the object is {100 * abs(self.scale - 1.0):.2g} % {size}: scaled"
@@ -170,6 +175,7 @@ class Deviation:
             "scale": self.scale,
             "offset": self.offset,
             "facing": self.facing.tolist(),
+            "facets": self.facets,
             "bent": self.bent,
             "length": self.length,
             "rms": self.rms,

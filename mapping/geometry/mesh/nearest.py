@@ -122,7 +122,7 @@ class NearestPoint:
         Reference: Phong, Communications of the ACM 18, 1975.
         """
         asked, row = np.unique(face, return_inverse=True)
-        corners = self._corner_normals(asked)[row.ravel()]
+        corners = self.corner_normals(asked)[row.ravel()]
         return _unit(np.einsum("nc,ncx->nx", barycentric, corners))
 
     def bulge(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
@@ -137,12 +137,12 @@ class NearestPoint:
             barycentric: (N, 3) their coordinates there.
         """
         asked, row = np.unique(face, return_inverse=True)
-        normals, corners = self._corner_normals(asked), self.surface.vertices[self.surface.faces[asked]]
+        normals, corners = self.corner_normals(asked), self.surface.vertices[self.surface.faces[asked]]
         ahead = [1, 2, 0]
         rise = 0.5 * np.einsum("fcx,fcx->fc", normals[:, ahead] - normals, corners[:, ahead] - corners)
         return np.asarray(np.einsum("nc,nc->n", barycentric * barycentric[:, ahead], rise[row.ravel()]))
 
-    def _corner_normals(self, face: IntArray) -> FloatArray:
+    def corner_normals(self, face: IntArray) -> FloatArray:
         """(N, 3, 3) of each corner of some faces the mean normal of the faces about it that no crease parts from it."""
         normals, (order, first) = self.surface.face_normals, self._corners_at
         vertices = self.surface.faces[face].ravel()

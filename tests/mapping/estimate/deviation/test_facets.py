@@ -1,0 +1,94 @@
+"""Facets that stand for something round are rounded out; flats stay flat; what was felt decides."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mapping.arrays import FloatArray
+from mapping.base import Base
+from mapping.estimate.deviation import explain
+from mapping.estimate.deviation.facets import round_out
+from mapping.geometry.contact import BallContact
+from mapping.surface import Surface
+from mapping.trace import Trace
+
+TIP, RADIUS, NOISE = 3e-3, 20e-3, 1e-6
+
+
+def prism(sides: int, low: float = -20e-3, high: float = 40e-3) -> Surface:
+    """A shaft in so many flats whose corners lie on it, closed at its ends."""
+    turn = 2.0 * np.pi * np.arange(sides) / sides
+    ring = RADIUS * np.column_stack([np.cos(turn), np.sin(turn)])
+    below, above = (np.column_stack([ring, np.full(sides, z)]) for z in (low, high))
+    ends = [[0.0, 0.0, low], [0.0, 0.0, high]]
+    here = np.arange(sides)
+    there = (here + 1) % sides
+    sides_ = [[here, there, there + sides], [here, there + sides, here + sides]]
+    lids = [[there, here, np.full(sides, 2 * sides)], [here + sides, there + sides, np.full(sides, 2 * sides + 1)]]
+    return Surface(np.concatenate([below, above, ends]), np.concatenate([np.stack(f, axis=1) for f in sides_ + lids]))
+
+
+def rings(radius: FloatArray | float, seed: int = 0) -> Trace:
+    """Ten rings of 1500 samples at a distance from the axis, with noise along it."""
+    rng, turn = np.random.default_rng(seed), np.linspace(0.0, 2.0 * np.pi, 1500, endpoint=False)
+    rows = []
+    for k in range(10):
+        r = radius + NOISE * rng.standard_normal(1500)
+        rows.append(np.column_stack([r * np.cos(turn), r * np.sin(turn), np.full(1500, 2e-3 * k)]))
+    return Trace(np.arange(15000.0), np.concatenate(rows), np.repeat(np.arange(10), 1500), TIP)
+
+
+@pytest.mark.parametrize("sides", [40, 256])
+def test_flats_of_a_round_shaft_are_rounded_out(sides: int) -> None:
+    bulge = RADIUS * (1.0 - np.cos(np.pi / sides))
+    trace, base = rings(RADIUS + TIP), Base(prism(sides))
+    found = explain(trace, base)
+    assert found is not None and found.causes == ("facets",)
+    assert found.facets == pytest.approx(bulge, rel=0.05)
+    assert "stand for a round body" in found.sentence()
+    left = found.base.foot(trace.centers, TIP).height
+    assert left.std() < 1.05 * NOISE and abs(left.mean()) < 0.2 * NOISE
+    assert not found.base.surface.open_sides.any(), "no gap opens"
+
+
+def test_flats_that_were_felt_as_flats_stay() -> None:
+    surface = prism(40)
+    centers = rings(RADIUS + 4.0 * TIP).centers
+    inward = -centers / np.linalg.norm(centers[:, :2], axis=1)[:, None] * [1.0, 1.0, 0.0]
+    felt = BallContact(surface, TIP).first_contact(centers, inward).centers
+    felt = np.asarray(felt) - NOISE * np.random.default_rng(1).standard_normal(len(felt))[:, None] * inward
+    trace = Trace(np.arange(15000.0), felt, np.repeat(np.arange(10), 1500), TIP)
+    assert round_out(trace, Base(surface)) is None
+
+
+def test_a_flat_beside_what_is_round_stays_flat() -> None:
+    """Half a shaft on a block, as drawings with fillets have it: corners where both meet lean to both."""
+    turn, low = np.linspace(0.0, np.pi, 25), -40e-3
+    arc = RADIUS * np.column_stack([np.cos(turn), np.sin(turn)])
+    outline = np.concatenate([arc, [[-RADIUS, low], [RADIUS, low]]])
+    count = len(outline)
+    here = np.arange(count)
+    there = (here + 1) % count
+    walls = [[here, here + count, there], [there, here + count, there + count]]
+    surface = Surface(
+        np.concatenate([np.insert(outline, 1, y, axis=1) for y in (-20e-3, 40e-3)]),
+        np.concatenate([np.stack(each, axis=1) for each in walls]),
+    )
+    rng, rows = np.random.default_rng(2), []
+    down, over, reach = np.linspace(0.0, -30e-3, 400), np.linspace(0.0, np.pi, 900), RADIUS + TIP
+    for k in range(10):
+        up_one = np.column_stack([np.full(400, reach), down[::-1]])
+        round_ = reach * np.column_stack([np.cos(over), np.sin(over)])
+        path = np.concatenate([up_one, round_, np.column_stack([np.full(400, -reach), down])])
+        path *= 1.0 + NOISE / RADIUS * rng.standard_normal((len(path), 1))
+        rows.append(np.insert(path, 1, 2e-3 * k, axis=1))
+    centers = np.concatenate(rows)
+    trace = Trace(np.arange(float(len(centers))), centers, np.repeat(np.arange(10), len(rows[0])), TIP)
+    before, found = Base(surface).foot(centers, TIP).height, round_out(trace, Base(surface))
+    assert found is not None
+    left = found.base.foot(centers, TIP).height
+    flat, top = centers[:, 2] < -8e-3, centers[:, 2] > 8e-3
+    assert before[top].std() > 10.0 * NOISE
+    # as much where both meet
+    assert left[flat].std() < 1.5 * NOISE and left[~flat].std() < 1.5 * NOISE and np.abs(left).max() < 6.0 * NOISE
