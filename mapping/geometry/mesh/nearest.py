@@ -112,8 +112,8 @@ class NearestPoint:
     def smooth_normals(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
         """(N, 3) unit normals of the smooth body that facets stand for: linear between those of a face's corners.
 
-        A corner's is the mean of those of the faces about it that no crease parts from this one, weighted by their
-        angles there. A facet's own is off by up to half of what it turns against the next one.
+        A corner's is the mean of those of the faces about it that no crease parts from this one (see `corner_normals`).
+        A facet's own is off by up to half of what it turns against the next one.
 
         Args:
             face: (N,) faces in which the places lie.
@@ -143,7 +143,14 @@ class NearestPoint:
         return np.asarray(np.einsum("nc,nc->n", barycentric * barycentric[:, ahead], rise[row.ravel()]))
 
     def corner_normals(self, face: IntArray) -> FloatArray:
-        """(N, 3, 3) of each corner of some faces the mean normal of the faces about it that no crease parts from it."""
+        """(N, 3, 3) of each corner of some faces the mean normal of the faces about it that no crease parts from it.
+
+        A face counts by the sine of its angle over the product of its sides there, which gives the normal of a ball
+        whose facets they are, and of a cylinder, exactly; weighted by angles those of an icosahedron in 1280 facets are
+        off by up to 5 mrad, which is 4 um between corners 3.5 mm apart.
+
+        Reference: Max, Weights for computing vertex normals from facet normals, Journal of Graphics Tools 4(2), 1999.
+        """
         normals, (order, first) = self.surface.face_normals, self._corners_at
         vertices = self.surface.faces[face].ravel()
         count = first[vertices + 1] - first[vertices]
@@ -153,7 +160,7 @@ class NearestPoint:
         other = beside // 3
         alike = np.einsum("ij,ij->i", normals[other], normals[face[own // 3]]) > np.cos(CREASE_ANGLE)
         sums = np.zeros((len(vertices), 3))
-        np.add.at(sums, own, np.where(alike, self._angles.ravel()[beside], 0.0)[:, None] * normals[other])
+        np.add.at(sums, own, np.where(alike, self._steepness.ravel()[beside], 0.0)[:, None] * normals[other])
         return _unit(sums).reshape(-1, 3, 3)
 
     @cached_property
@@ -162,6 +169,15 @@ class NearestPoint:
         vertices = self.surface.faces.ravel()
         order = np.argsort(vertices, kind="stable")
         return order, np.searchsorted(vertices[order], np.arange(len(self.surface.vertices) + 1))
+
+    @cached_property
+    def _steepness(self) -> FloatArray:
+        """(F, 3) sine of the faces' angles at their corners over the product of the sides there, 1/m^2."""
+        ends = self.surface.vertices[self.surface.faces]
+        u, v = (np.roll(ends, -k, axis=1) - ends for k in (1, 2))
+        squares = np.einsum("fcx,fcx->fc", u, u) * np.einsum("fcx,fcx->fc", v, v)
+        area = np.broadcast_to(2.0 * self.surface.face_areas[:, None], squares.shape)
+        return np.asarray(np.divide(area, squares, out=np.zeros_like(squares), where=squares > 0))
 
     @cached_property
     def _angles(self) -> FloatArray:
