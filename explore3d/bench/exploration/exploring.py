@@ -141,7 +141,7 @@ def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus"
 def _swept(strategy: str, explorer: Explorer, body: BenchScene, clock: _Clock, seed: int) -> Outcome:
     """Explore, or sweep blindly under the same checks; the outcome's value is an Explored."""
     if strategy in EXPLORING:
-        return explorer.go(clock.execute)
+        return explorer.go(clock.execute, meanwhile=clock.waits.meanwhile)
     base = Base(body.base)
     outcome, _ = explorer.carry_out(BASELINES[strategy](base, np.random.default_rng(seed)), base, clock.execute)
     return Outcome(outcome.reason, outcome.detail, Explored(base))
@@ -180,7 +180,7 @@ class _Clock:
     """Executes moves, keeps how long the finger waited for each of them, and what a log would hold, in memory."""
 
     def __init__(self, finger: Finger) -> None:
-        self.waits = Waits(finger.execute)
+        self.waits = Waits(finger.execute, finger.workspace.max_speed)
         self.felt: list[Trace] = []
         self.moves: list[Event] = []
         self._samples = 0
