@@ -26,6 +26,7 @@ from hw import Finger, Move
 from hw.simulated import TOP_SPEED_RADII, SimulatedFinger
 from mapping import Trace
 from mapping.base import Base
+from mapping.geometry.mesh import algebra_in_one_thread
 from mapping.model import ObjectModel
 from planners import Outcome, Plan
 from planners.survey import Ergodic, RandomSweeps, Raster
@@ -116,8 +117,9 @@ def bench_scene(body: BenchScene, strategy: str, seed: int, noise: str = "appara
     return body.scene(body.text(seed, FINGER_NOISES[noise], EXPLORING.get(strategy, PRECISION)))
 
 
+@algebra_in_one_thread()
 def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus") -> dict[str, Any]:
-    """Sweep the body by one strategy, build its model, and compare it with the truth."""
+    """Sweep the body by one strategy, build its model, and compare it with the truth; as `run` does, in one thread."""
     scene = bench_scene(body, strategy, seed, noise)
     with scene_finger(scene) as finger:
         assert isinstance(finger, SimulatedFinger)  # every bench scene names it
