@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from planners.drive import drive as drive, dry_run as dry_run
     from planners.errors import PlannerError as PlannerError
     from planners.explore.explore import Explore as Explore
+    from planners.meanwhile import Meanwhile as Meanwhile
     from planners.plan import (
         Outcome as Outcome,
         Parted as Parted,
@@ -24,6 +25,7 @@ _PUBLIC = {
     "drive": ("drive", "dry_run"),
     "errors": ("PlannerError",),
     "explore.explore": ("Explore",),
+    "meanwhile": ("Meanwhile",),
     "plan": ("Outcome", "Parted", "Plan", "Refused", "executed", "made"),
     "survey.survey": ("Survey",),
 }

@@ -6,10 +6,11 @@
 from __future__ import annotations
 
 import gc
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from time import process_time
+from time import perf_counter, process_time, thread_time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from hw import FingerError, Move, Workspace
 from mapping import FloatArray, Trace, length_text
 from mapping.base import Base
 from mapping.geometry.mesh import asked_part
-from planners import Outcome, Plan, Spent, Survey, drive, within
+from planners import Meanwhile, Outcome, Plan, Spent, Survey, drive, within
 from planners.explore import Discover, Explore, Locate, SurveyCount
 from planners.paths import FeltDetails, Limits, Ways, routed
 
@@ -48,24 +49,38 @@ class Waits:
     """Carries out moves, and keeps how long the finger waited for each: planning, checks, ways, and writing it down.
 
     In CPU time of this program, so that what else a computer does is not counted; what carries a move out (where the
-    finger is simulated, that is much) is counted by itself.
+    finger is simulated, that is much) is counted by itself. What the plan hands over for it is worked out while the
+    finger moves, in a thread of its own, and makes it wait only as far as it takes longer than the move. A simulated
+    finger has the time that a real one would take.
 
     Args:
         execute: carries out one move.
+        travel_speed: of the straight way to a move from where the one before ended, m/s.
+        meanwhile: takes what can be worked out while the finger moves.
         each: before every move, s; the first one holds what was made ready before anything moved.
         carrying_out: of all moves, s.
+        worked: while the finger moved, s.
     """
 
     execute: Execute
+    travel_speed: float = np.inf
+    meanwhile: Meanwhile = field(init=False, default_factory=Meanwhile)
     each: list[float] = field(init=False, default_factory=list)
     carrying_out: float = field(init=False, default=0.0)
+    worked: float = field(init=False, default=0.0)
     _since: float = field(init=False, default_factory=process_time)
+    _late: float = field(init=False, default=0.0)  # what the work beside the last move took longer than that
     _after: float = field(init=False, default=0.0)
+    _moved: Spent = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._moved = Spent(self.travel_speed)
 
     @property
     def planning(self) -> float:
-        """What all waits come to, and what the plan did after its last move, s."""
-        return sum(self.each) + self._after
+        """What all waits come to, what was worked out while the finger moved, and what the plan did after its last
+        move, s."""
+        return sum(self.each) + self.worked + self._after
 
     def ended(self) -> None:
         """The plan is over."""
@@ -89,13 +104,54 @@ class Waits:
     def __call__(self, move: Move) -> Trace:
         if not self.each:
             gc.freeze()
-        begin = process_time()
-        self.each.append(begin - self._since)
+        begin, before = process_time(), self._moved.seconds
+        self.each.append(begin - self._since + self._late)
+        self._moved.count(move)
+        beside = _Beside(self.meanwhile, self._moved.seconds - before)
         try:
-            return self.execute(move)
+            with beside:
+                return self.execute(move)
         finally:
-            self._since = process_time()
-            self.carrying_out += self._since - begin
+            self._since, self._late = process_time(), beside.late
+            self.worked += beside.seconds - beside.late
+            self.carrying_out += self._since - begin - beside.seconds
+
+
+class _Beside:
+    """Works beside a move, in a thread of its own: until the move is over and its time is, too.
+
+    Args:
+        meanwhile: what there is to do.
+        moving: how long the finger moves, s.
+    """
+
+    def __init__(self, meanwhile: Meanwhile, moving: float) -> None:
+        self.meanwhile, self.moving = meanwhile, moving
+        self.seconds = 0.0  # worked, in CPU time
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="beside a move") if meanwhile.waiting else None
+
+    @property
+    def late(self) -> float:
+        """How much longer the work took than the move, s."""
+        return max(0.0, self.seconds - self.moving)
+
+    def _work(self) -> None:
+        begin = thread_time()
+        while self.meanwhile.waiting and (self.seconds < self.moving or not self._over.is_set()):
+            self.meanwhile.work()
+            self.seconds = thread_time() - begin
+
+    def __enter__(self) -> None:
+        self._begin = perf_counter()
+        if self._thread is not None:
+            self._thread.start()
+
+    def __exit__(self, *raised: object) -> None:
+        self.moving = max(self.moving, perf_counter() - self._begin)
+        self._over.set()
+        if self._thread is not None:
+            self._thread.join()
 
 
 @dataclass
@@ -349,13 +405,21 @@ class Explorer:
         )
         return outcome, spent.seconds
 
-    def go(self, execute: Execute, event: Event = unheard, watch: SurveyWatch | None = None) -> Outcome:
+    def go(
+        self,
+        execute: Execute,
+        event: Event = unheard,
+        watch: SurveyWatch | None = None,
+        meanwhile: Meanwhile | None = None,
+    ) -> Outcome:
         """Find the base, explore it; why it ended, with an Explored as its value.
 
         Args:
             execute: carries out one move.
             event: told the base, and what was refused.
             watch: counts the sweeps of the survey, if anyone asks.
+            meanwhile: takes what can be worked out while the finger moves; what `execute` does not do of it, the plan
+                does when it needs it.
         """
         outcome, seconds = self._base(execute, event)
         base: Base | None = outcome.value
@@ -366,7 +430,7 @@ class Explorer:
             detail = f"the budget was spent before exploring began: {outcome.detail}"
             return Outcome("budget", detail, Explored(base))
         plan = self.explore(base=base, time_budget=left).plan(
-            count=None if watch is None else watch.begun(), nothing_moved=self.locate is None and self.discover is None
+            count=None if watch is None else watch.begun(), meanwhile=meanwhile
         )
         found, _ = self.carry_out(plan, base, execute, event, left)
         detail = f"{found.detail}; before that, to know the base: {outcome.detail}" if outcome.detail else found.detail

@@ -193,7 +193,7 @@ def _explore(
             touched = replay.before(touch, getattr(finger, "skip", None), log.write)
 
         cut_short: list[str] = []
-        waits = Waits(touched)
+        waits = Waits(touched, finger.workspace.max_speed)
 
         def execute(move: Move) -> Trace:
             trace = waits(move)
@@ -210,7 +210,7 @@ def _explore(
 
         watch = SurveyWatch(execute, log.event)
         try:
-            outcome = explorer(scene, finger.workspace).go(watch, log.event, watch)
+            outcome = explorer(scene, finger.workspace).go(watch, log.event, watch, waits.meanwhile)
         except BaseException as error:
             if log.samples:
                 stop = watch.stop(cause(error))

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 
-from mapping import FloatArray, length_text
+from hw import Move
+from mapping import FloatArray, Trace, length_text
 from mapping.base import Base
 from mapping.detection import Crossing
 from mapping.instrument import Noise, StatedNoise
-from planners import Outcome, Plan, PlannerError, Spent, within
+from planners import Meanwhile, Outcome, Plan, PlannerError, Spent, within
 from planners.explore.faint_search import CloserLook, FaintSearch
 from planners.explore.found import Found
 from planners.explore.surveyor import CANDIDATES, SurveyCount, Surveyor
@@ -124,21 +125,24 @@ class Explore:
         return Strokes(self.base, self.tip_radius, self.speed, self.force)
 
     def plan(
-        self, rng: np.random.Generator | None = None, count: SurveyCount | None = None, nothing_moved: bool = False
+        self,
+        rng: np.random.Generator | None = None,
+        count: SurveyCount | None = None,
+        meanwhile: Meanwhile | None = None,
     ) -> Plan:
         """The whole exploration; the outcome's value is a Found. Nothing in it is random: `rng` is not used.
 
         Args:
             count: is kept up while the survey goes on.
-            nothing_moved: True if no finger waits yet: all sweeps are laid out before the first move then, where the
-                noise is foretold. They are the same.
+            meanwhile: takes what can be worked out while the finger moves; whoever carries the moves out may do it.
         """
         get_ready(self.tip_radius)
         found = Found(self.tip_radius, noise=self.noise)
-        spent = Spent(25.0 * self.tip_radius if self.travel_speed is None else self.travel_speed)
+        spent = Spent(self._travel_speed)
         count = SurveyCount() if count is None else count
+        meanwhile = Meanwhile() if meanwhile is None else meanwhile
         surveyor = Surveyor(
-            self.survey, found, self.false_alarms_per_metre, self.stated, count, self.expected, nothing_moved
+            self.survey, found, self.false_alarms_per_metre, self.stated, count, self.expected, meanwhile
         )
         everything = self._everything(surveyor, found)
         outcome = yield from within(everything, spent, self.time_budget, self.path_budget)
@@ -174,9 +178,14 @@ class Explore:
     def _everything(self, surveyor: Surveyor, found: Found) -> Plan:
         yield from surveyor.plan()
         found.surveyed, found.asked = True, surveyor.visible * self.smallest
-        deviation = surveyor.deviation()
-        if deviation is None:
-            return (yield from self._hunt(surveyor, found))
+        judged = surveyor.judge_model()
+        if not found.unexplained():
+            surveyor.meanwhile.finish()  # there is nothing to go to before
+        hunted = yield from self._begun(self._hunt(surveyor, found), surveyor, lambda: judged == [None])
+        if hunted is not None:
+            return hunted
+        (deviation,) = judged
+        assert deviation is not None  # the hunt would have gone on
         found.actions.append(deviation.sentence())
         if deviation.beyond_repair:
             found.left_out.append("circuits, ridge following and sizing: the model is wrong beyond repair")
@@ -184,6 +193,10 @@ class Explore:
         surveyor.look_again(deviation)
         outcome = yield from replace(self, base=deviation.base)._hunt(surveyor, found)
         return outcome
+
+    @property
+    def _travel_speed(self) -> float:
+        return 25.0 * self.tip_radius if self.travel_speed is None else self.travel_speed
 
     def _hunt(self, surveyor: Surveyor, found: Found) -> Plan:
         """Look into what the survey showed, until nothing is left to sharpen."""
@@ -272,10 +285,41 @@ class Explore:
         branches: tuple[Crossing, ...] = circled.value
         if surveyor.may_be_part(seed):
             surveyor.look_for_parts()
+            shown = (seed, *branches)
+            begun = yield from self._begun(
+                self._follow_or_size(seed, circled, found, sense),
+                surveyor,
+                lambda: len(surveyor.off_parts(shown)) == len(shown),
+            )
+            if begun is not None:
+                return begun
             beside = surveyor.off_parts(branches)
             if not surveyor.off_parts((seed,)) or (branches and not beside):
                 return Outcome("part", "the body differs from its model there")
-            branches = beside
+            circled = replace(circled, value=beside)
+        return (yield from self._follow_or_size(seed, circled, found, sense))
+
+    def _begun(
+        self, plan: Plan, surveyor: Surveyor, right: Callable[[], bool]
+    ) -> Generator[Move, Trace, Outcome | None]:
+        """A plan whose first move is made while it is worked out whether it is right; None if it is not."""
+        if not surveyor.meanwhile.waiting and not right():
+            return None
+        try:
+            answer = yield next(plan)
+            surveyor.meanwhile.finish()
+            if not right():
+                plan.close()
+                return None
+            while True:
+                answer = yield plan.send(answer)
+        except StopIteration as end:
+            outcome: Outcome = end.value
+            return outcome
+
+    def _follow_or_size(self, seed: Crossing, circled: Outcome, found: Found, sense: Sense) -> Plan:
+        """Follow the ridge or size the bump that was circled; the circuit's outcome has its branches."""
+        branches: tuple[Crossing, ...] = circled.value
         if branches:
             seed, ways = _typed(seed, branches), headings(seed, branches, self.tip_radius)
         else:

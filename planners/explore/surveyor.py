@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -14,8 +15,9 @@ from mapping.base import LaidTrace
 from mapping.detection import Coverage, Crossing, detect, expected_limit
 from mapping.estimate.deviation import WIDE_PART, Deviation, Part, explain, lay_out
 from mapping.instrument import Noise, StatedNoise
-from planners import Outcome, Plan, executed
+from planners import Meanwhile, Outcome, Plan, executed
 from planners.explore.found import Found
+from planners.paths import Isoline
 from planners.survey import Survey
 
 # Path of the first survey sweeps, in tip radii, that tell the noise if it is not given; later ones are detected singly
@@ -37,6 +39,8 @@ LEAST_VISIBLE_SHARE, MOST_VISIBLE_SHARE = 0.1, 5.0 / 6.0
 # Sweeps that were laid out before the first told the noise stand if what it told leaves so much of the surface
 # inspected, and would make strips no wider than by one over that; so much is asked of a run in the end
 STANDS = 0.95
+# Sweeps that are laid out before they are made: one line in two may give none at all in narrow places
+SWEEPS_AHEAD = 2
 # Samples that a sweep must have to be looked at
 FEWEST_SWEEP_SAMPLES = 16
 
@@ -75,7 +79,7 @@ class Surveyor:
         metres: length of all lines that are laid out, m.
         parts: where the body differs from its model alone, by what was felt: nothing is looked for there.
         count: kept up as it goes.
-        nothing_moved: True if no finger waits yet: what can be is worked out before the first move then.
+        meanwhile: takes what can be worked out while the finger moves.
     """
 
     survey: Survey
@@ -84,7 +88,7 @@ class Surveyor:
     stated: StatedNoise | None = None
     count: SurveyCount = field(default_factory=SurveyCount)
     expected: float | None = None
-    nothing_moved: bool = False
+    meanwhile: Meanwhile = field(default_factory=Meanwhile)
     visible: float = field(init=False)
     given_noise: Noise | None = field(init=False)
     paths: list[FloatArray] = field(init=False, default_factory=list)
@@ -93,66 +97,110 @@ class Surveyor:
     limit: float = field(init=False, default=0.0)
     metres: float = field(init=False, default=0.0)
     parts: tuple[Part, ...] = field(init=False, default=())
+    _waiting: list[Trace] = field(init=False, default_factory=list)  # felt, but not detected yet
+    _felt_metres: float = field(init=False, default=0.0)
+    _again: Iterator[Move] | None = field(init=False, default=None)  # the sweeps where the first ones did not stand
 
     def __post_init__(self) -> None:
         self.visible = self.survey.visible if self.expected is None else self._visible_for(self.expected)
         self.given_noise = self.found.noise
 
     def plan(self) -> Plan:
-        """Every sweep of the survey; the first ones are detected together, for they tell the noise."""
+        """Every sweep of the survey; the first ones are detected together, for they tell the noise.
+
+        What a sweep felt is looked at while the next one is made. So is whether the sweeps stand, by the first, if
+        something foretold that they will.
+        """
         strips = self.survey.crossed(self.survey.visible) is None
         if not strips:
             self.visible = self.survey.visible
-        # where the noise is foretold, or decides nothing, the sweeps will stand
-        stand = self.nothing_moved and (self.expected is not None or not strips)
-        sweeps, waiting, felt = self._laid_out(at_once=stand), list[Trace](), 0.0
-        while (move := next(sweeps, None)) is not None:
-            answer = yield move
-            self.count.made += 1
-            done, trace = executed(move, answer), LaidTrace.of(answer, self.survey.base)
-            self._keep(done, trace)
-            if strips and self.count.made == 1 and not self._stands(done, trace):
-                sweeps = self._laid_out()
-                continue
-            self.paths.extend(self.survey.touched(part) for part in done)
-            if not done:
-                self.found.left_out.append("a survey sweep was not carried out")
-                continue
-            if len(trace) == 0:
-                self.found.left_out.append("a survey sweep felt no contact")
-                continue
-            waiting.append(trace)
-            felt += sum(part.length for part in done)
-            if self.found.noise is not None or felt >= FIRST_NOISE_PATH * self.survey.tip_radius:
-                self._detect(waiting)
-        if waiting:
-            self._detect(waiting)
+        sweeps, judged, made = self._laid_out(), not strips, list[tuple[Sequence[Move], LaidTrace]]()
+        while (move := next(sweeps, None)) is not None or made:
+            if move is not None:
+                answer = yield move
+                self.count.made += 1
+                made.append((executed(move, answer), LaidTrace.of(answer, self.survey.base)))
+                self._keep(*made[-1])
+                if not judged and len(made) == 1:
+                    self.meanwhile.later(partial(self._judge, *made[0]))
+                    if self.expected is not None:
+                        continue
+            if not judged:
+                self.meanwhile.finish()
+                judged = True
+                if self._again is not None:
+                    sweeps = self._again
+                    made.clear()
+                    continue
+            for each in made:
+                self.meanwhile.later(partial(self._look_at, *each))
+            made.clear()
+        self.meanwhile.finish()
+        if self._waiting:
+            self._detect(self._waiting)
         return Outcome("done")
 
-    def _laid_out(self, *, at_once: bool = False) -> Iterator[Move]:
-        """The sweeps. What ball and stem can make of a line is worked out of all at once, or of each before it, which
-        may take 90 ms in narrow places."""
+    def _judge(self, done: Sequence[Move], first: Trace) -> None:
+        """Lay the sweeps out again if they do not stand as they are."""
+        if not self._stands(done, first):
+            self._again = self._laid_out()
+
+    def _look_at(self, done: Sequence[Move], trace: LaidTrace) -> None:
+        """Note what was swept, and detect what it shows, the first sweeps together."""
+        self.paths.extend(self.survey.touched(part) for part in done)
+        if not done:
+            self.found.left_out.append("a survey sweep was not carried out")
+            return
+        if len(trace) == 0:
+            self.found.left_out.append("a survey sweep felt no contact")
+            return
+        self._waiting.append(trace)
+        self._felt_metres += sum(part.length for part in done)
+        if self.found.noise is not None or self._felt_metres >= FIRST_NOISE_PATH * self.survey.tip_radius:
+            self._detect(self._waiting)
+
+    def _laid_out(self) -> Iterator[Move]:
+        """The sweeps. What ball and stem can make of a line may take 90 ms in narrow places: it is worked out while
+        an earlier one is swept."""
         lines = deque(self.survey.lines(self.visible))
         self.metres = sum(line.length for line in lines)
-        known = deque(list(self.survey.pressed(line)) for line in lines) if at_once else None
-        while lines:
-            line = lines.popleft()
-            ahead = deque(self.survey.pressed(line) if known is None else known.popleft())
-            later = len(lines) if known is None else sum(len(parts) for parts in known)
-            while ahead:
-                self.count.planned = self.count.made + len(ahead) + later
-                yield ahead.popleft()
+        ahead = deque[list[Move]]()
+        self._lay_ahead(lines, ahead)
+        return self._in_turn(lines, ahead)
+
+    def _lay_ahead(self, lines: deque[Isoline], ahead: deque[list[Move]]) -> None:
+        """Lay out lines until enough sweeps are ahead."""
+        while lines and sum(map(len, ahead)) < SWEEPS_AHEAD:
+            ahead.append(list(self.survey.pressed(lines.popleft())))
+
+    def _in_turn(self, lines: deque[Isoline], ahead: deque[list[Move]]) -> Iterator[Move]:
+        """The sweeps that are laid out, while others are."""
+        while ahead:
+            sweeps = deque(ahead.popleft())
+            while sweeps:
+                self.count.planned = self.count.made + len(sweeps) + sum(map(len, ahead)) + len(lines)
+                sweep = sweeps.popleft()
+                self.meanwhile.later(partial(self._lay_ahead, lines, ahead))
+                yield sweep
+            if not ahead:
+                self.meanwhile.finish()
         self.count.planned = self.count.made
 
     def _keep(self, done: Sequence[Move], trace: Trace) -> None:
         self.commanded.extend(part.path for part in done)
         self.felt.extend([trace] if len(trace) else [])
 
-    def deviation(self) -> Deviation | None:
-        """What all that was felt shows to be wrong with the model, None if nothing."""
+    def judge_model(self) -> list[Deviation | None]:
+        """Work out meanwhile what all that was felt shows to be wrong with the model: put into the list, None if it is
+        nothing."""
+        shown: list[Deviation | None] = []
+        felt, commanded = tuple(self.felt), tuple(self.commanded)
+        self.meanwhile.later(lambda: shown.append(self._explained(felt, commanded)))
+        return shown
+
+    def _explained(self, felt: Sequence[Trace], commanded: Sequence[FloatArray]) -> Deviation | None:
         base = self.survey.base
-        felt = LaidTrace.together(self.felt, base) if self.felt else None
-        return None if felt is None else explain(felt, base, self.commanded, self.metres)
+        return explain(LaidTrace.together(felt, base), base, commanded, self.metres) if felt else None
 
     def look_again(self, deviation: Deviation) -> None:
         """What was found on a wrong model is forgotten, and looked for on the corrected one; not where parts differ."""
@@ -163,6 +211,7 @@ class Surveyor:
             laid = laid.within(deviation.outside(laid.feet().points))
         self.survey = replace(self.survey, base=deviation.base)
         self.found.crossings.clear()
+        self.found.tried.clear()
         self.found.noise = self.given_noise
         self.found.unseen.clear()
         self._detect([laid])
@@ -184,12 +233,14 @@ class Surveyor:
         return bool(self.parts) or 2.0 * seed.half_width >= WIDE_PART * self.survey.tip_radius
 
     def look_for_parts(self) -> None:
-        """Find the parts by all that was felt since, too, and forget what was detected on them.
+        """Find the parts meanwhile by all that was felt by now, and forget what was detected on them.
 
         A survey may cross one once, as it would a groove, or its rim alone; what goes round it tells.
         """
-        base = self.survey.base
-        deviation = explain(LaidTrace.together(self.felt, base), base, self.commanded, self.metres)
+        self.meanwhile.later(partial(self._find_parts, tuple(self.felt), tuple(self.commanded)))
+
+    def _find_parts(self, felt: Sequence[Trace], commanded: Sequence[FloatArray]) -> None:
+        deviation = self._explained(felt, commanded)
         self.parts = () if deviation is None else deviation.parts
         self.found.crossings[:] = self.off_parts(self.found.crossings)
 

@@ -26,6 +26,7 @@ from hw import Finger, Move
 from hw.simulated import TOP_SPEED_RADII, SimulatedFinger
 from mapping import Trace
 from mapping.base import Base
+from mapping.geometry.mesh import algebra_in_one_thread
 from mapping.model import ObjectModel
 from planners import Outcome, Plan
 from planners.survey import Ergodic, RandomSweeps, Raster
@@ -116,8 +117,9 @@ def bench_scene(body: BenchScene, strategy: str, seed: int, noise: str = "appara
     return body.scene(body.text(seed, FINGER_NOISES[noise], EXPLORING.get(strategy, PRECISION)))
 
 
+@algebra_in_one_thread()
 def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus") -> dict[str, Any]:
-    """Sweep the body by one strategy, build its model, and compare it with the truth."""
+    """Sweep the body by one strategy, build its model, and compare it with the truth; as `run` does, in one thread."""
     scene = bench_scene(body, strategy, seed, noise)
     with scene_finger(scene) as finger:
         assert isinstance(finger, SimulatedFinger)  # every bench scene names it
@@ -141,7 +143,7 @@ def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus"
 def _swept(strategy: str, explorer: Explorer, body: BenchScene, clock: _Clock, seed: int) -> Outcome:
     """Explore, or sweep blindly under the same checks; the outcome's value is an Explored."""
     if strategy in EXPLORING:
-        return explorer.go(clock.execute)
+        return explorer.go(clock.execute, meanwhile=clock.waits.meanwhile)
     base = Base(body.base)
     outcome, _ = explorer.carry_out(BASELINES[strategy](base, np.random.default_rng(seed)), base, clock.execute)
     return Outcome(outcome.reason, outcome.detail, Explored(base))
@@ -180,7 +182,7 @@ class _Clock:
     """Executes moves, keeps how long the finger waited for each of them, and what a log would hold, in memory."""
 
     def __init__(self, finger: Finger) -> None:
-        self.waits = Waits(finger.execute)
+        self.waits = Waits(finger.execute, finger.workspace.max_speed)
         self.felt: list[Trace] = []
         self.moves: list[Event] = []
         self._samples = 0

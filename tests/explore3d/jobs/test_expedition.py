@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import gc
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from time import process_time
+from time import thread_time
 
 import numpy as np
 import pytest
@@ -166,15 +167,52 @@ def test_an_object_that_stands_too_far_off_is_not_explored(tmp_path: Path) -> No
     assert any(left.stage == "pose" for left in analysis.left_out)
 
 
-def test_waits_are_what_the_program_takes_between_moves_and_not_what_the_finger_does():
-    def busy(seconds: float) -> None:
-        end = process_time() + seconds
-        while process_time() < end:
-            pass
+def busy(seconds: float) -> None:
+    """Take so much CPU time in this thread."""
+    end = thread_time() + seconds
+    while thread_time() < end:
+        pass
 
+
+def nothing() -> Trace:
+    return Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), 5e-3)
+
+
+def test_work_beside_a_move_makes_the_finger_wait_only_as_far_as_it_takes_longer():
+    def execute(move: Move) -> Trace:
+        busy(0.02)
+        return nothing()
+
+    move = Move(np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]]), np.array([0.0, 0.0, -1.0]), speed=0.1)  # 0.1 s
+    waits, done = Waits(execute, 0.1), list[float]()
+
+    def piece(seconds: float) -> None:
+        busy(seconds)
+        done.append(seconds)
+
+    for pieces in ((0.04, 0.04), (0.15, 0.03), ()):
+        for seconds in pieces:
+            waits.meanwhile.later(partial(piece, seconds))
+        waits(move)
+    waits.ended()
+    # the second move begins 0.01 m from where the first one ended, and takes 0.2 s; the last piece was not begun late
+    assert done == [0.04, 0.04, 0.15, 0.03]
+    assert waits.each[2] == pytest.approx(0.0, abs=5e-3) and waits.worked == pytest.approx(0.26, rel=0.1)
+    assert waits.carrying_out == pytest.approx(0.06, rel=0.4)
+    waits = Waits(execute)  # no time is known to pass on the way to a move
+    for seconds in (0.15, 0.03):
+        waits.meanwhile.later(partial(piece, seconds))
+    waits(move)
+    assert waits.meanwhile.waiting  # it was too late for the last piece
+    waits(move)
+    assert waits.each[1] == pytest.approx(0.05, rel=0.2) and not waits.meanwhile.waiting
+    assert waits.planning == pytest.approx(0.18 + waits.each[0], rel=0.1)
+
+
+def test_waits_are_what_the_program_takes_between_moves_and_not_what_the_finger_does():
     def execute(move: Move) -> Trace:
         busy(0.05)
-        return Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), 5e-3)
+        return nothing()
 
     waits = Waits(execute)
     for seconds in (0.1, 0.02, 0.04, 0.02):

@@ -30,7 +30,7 @@ from planners.follow.sense import Sense
 from planners.follow.template_fit import crest_shape, dip_shape, edge_shape, end_shape, fit_shape
 from planners.paths.limits import Limits
 from planners.paths.strokes import Strokes, tangential
-from planners.plan import Outcome, Plan
+from planners.plan import Outcome, Plan, Refused
 
 R = 0.01
 WIRE = 0.65e-3
@@ -375,42 +375,54 @@ class Line(int):
     length = 2.0
 
 
-def test_a_survey_is_worked_out_as_it_goes_and_knows_how_long_it_is():
-    pressed = list[int]()
+def survey_of(parts: dict[int, list[int]], pressed: list[int]) -> Any:
+    """Ten lines, each a sweep but where it is said to be in other parts; what was laid out is put into `pressed`."""
 
     def press(line):
         pressed.append(line)
-        yield from {4: [], 5: [5, 50], 9: []}.get(line, [line])  # one in two parts, two not at all
+        yield from parts.get(line, [line])
 
-    surveyor = Surveyor(
-        SimpleNamespace(visible=0.35, lines=lambda visible: map(Line, range(10)), pressed=press), Found(R), 1.0
-    )
+    return SimpleNamespace(visible=0.35, lines=lambda visible: map(Line, range(10)), pressed=press)
+
+
+def test_a_survey_is_worked_out_a_little_ahead_while_its_sweeps_are_made_and_knows_how_long_it_is():
+    pressed = list[int]()
+    surveyor = Surveyor(survey_of({4: [], 5: [5, 50], 9: []}, pressed), Found(R), 1.0)
     moves, known, planned = list[int](), list[int](), list[int | None]()
     for move in surveyor._laid_out():
         moves.append(move)
         known.append(len(pressed))
         planned.append(surveyor.count.planned)
+        surveyor.meanwhile.finish()  # the move is made
         surveyor.count.made += 1
     assert moves == [0, 1, 2, 3, 5, 50, 6, 7, 8] and surveyor.count.planned == surveyor.count.made == 9
-    assert known == [1, 2, 3, 4, 6, 6, 7, 8, 9]  # no line before its time
-    assert planned == [10] * 9  # one line more gives none, one line fewer is in two parts
+    assert known == [2, 3, 4, 6, 6, 8, 8, 9, 10]  # two sweeps ahead, and nothing is laid out between two moves
+    assert planned == [10] * 8 + [9]  # one line gives none, one is in two parts, and the last gives none again
     assert surveyor.metres == 20.0
 
 
-def test_a_survey_that_will_stand_is_worked_out_before_the_first_move():
-    pressed = list[int]()
+def test_a_survey_whose_finger_works_out_nothing_makes_the_same_sweeps():
+    surveyor = Surveyor(survey_of({2: [], 3: [], 4: [], 9: []}, list[int]()), Found(R), 1.0)
+    assert list(surveyor._laid_out()) == [0, 1, 5, 6, 7, 8]
 
-    def press(line):
-        pressed.append(line)
-        yield from {4: [], 5: [5, 50]}.get(line, [line])
 
-    survey = SimpleNamespace(visible=0.35, smallest=1e-3, lines=lambda visible: map(Line, range(8)), pressed=press)
-    survey.crossed = lambda visible: None
-    foretold = {"expected": 1e-4, "nothing_moved": True}
-    for settings in ({}, {"expected": 1e-4}, {"nothing_moved": True}, foretold):
-        pressed.clear()
-        surveyor = Surveyor(survey, Found(R), 1.0, **settings)
-        assert next(surveyor.plan()) == 0
-        assert pressed == (list(range(8)) if settings == foretold else [0])
-    assert surveyor.count.planned == 8  # in parts, of which one line has none and one two
-    assert list(surveyor._laid_out(at_once=True)) == list(surveyor._laid_out()) == [0, 1, 2, 3, 5, 50, 6, 7]
+@pytest.mark.parametrize(("expected", "before"), [(1e-4, [0, 1]), (None, [0])])
+def test_a_survey_that_does_not_stand_is_laid_out_again_while_its_second_sweep_is_made_if_it_should_have_stood(
+    monkeypatch, expected, before
+):
+    survey = survey_of({}, list[int]())
+    survey.crossed, survey.base = lambda visible: None, Base(PLATE)
+    survey.smallest = 1e-3
+    surveyor = Surveyor(survey, Found(R), 1.0, expected=expected)
+    monkeypatch.setattr(Surveyor, "_stands", lambda self, done, first: False)
+    plan, asked = surveyor.plan(), list[int]()
+    move = next(plan)
+    while True:
+        asked.append(move)
+        surveyor.meanwhile.finish()
+        try:
+            move = plan.send(Refused.because("none is made here", R))
+        except StopIteration:
+            break
+    assert asked == [*before, *range(10)]
+    assert surveyor.found.left_out == ["a survey sweep was not carried out"] * 10  # those before are not told
