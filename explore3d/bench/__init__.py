@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from explore3d.bench.scaling import AXES as AXES, bench_scaling as bench_scaling, scaling_lines as scaling_lines
     from explore3d.bench.sections import (
         bench_sections as bench_sections,
+        is_flagged as is_flagged,
+        is_stated as is_stated,
+        judged_size as judged_size,
         section_lines as section_lines,
         section_trial as section_trial,
     )
@@ -65,7 +68,7 @@ _PUBLIC = {
     "dynamics": ("dynamics_curve", "dynamics_table", "wire_trace"),
     "figures": ("write_figures",),
     "scaling": ("AXES", "bench_scaling", "scaling_lines"),
-    "sections": ("bench_sections", "section_lines", "section_trial"),
+    "sections": ("bench_sections", "is_flagged", "is_stated", "judged_size", "section_lines", "section_trial"),
     "trace": (
         "PEER_SECONDS",
         "TRACED_MESH_SIZES",

@@ -80,7 +80,7 @@ def section_trial(body: str, noise: str, seed: int, tip: float = SECTION_TIP) ->
     main = max(features, key=lambda feature: feature.evidence.snr)
     # what runs out is said to be as wide as at half of its height
     widths = truth.widths if main.details.exponent is None else (truth.width_half_way,) * 2
-    judged = {"height": _judged(main.height, (truth.height,) * 2), "width": _judged(main.width, widths)}
+    judged = {"height": judged_size(main.height, (truth.height,) * 2), "width": judged_size(main.width, widths)}
     flagged = is_flagged(main)
     if record["kinds"] != truth.count * [truth.kind]:
         stated = is_stated(features, truth.count * [truth.kind])
@@ -115,7 +115,7 @@ def is_stated(features: Sequence[Feature], kinds: Sequence[str]) -> bool:
     return true > 0.0 and sum(share for share in shares.values() if share > true) < STATED_SHARE
 
 
-def _judged(interval: Interval, truth: tuple[float, float]) -> str:
+def judged_size(interval: Interval, truth: tuple[float, float]) -> str:
     """Whether the interval holds one of the true values ("true"), or is a bound that they keep to, or is "wrong"."""
     if interval.censored:
         largest = max(abs(each) for each in truth)

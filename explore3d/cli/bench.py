@@ -475,6 +475,34 @@ def sections(
 
 
 @bench.command()
+def shapes(
+    store: Store,
+    shapes: Annotated[str | None, typer.Option(help="Shapes, separated by commas; all if left out.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds of place, rows and noise.")] = 20,
+    building: Annotated[bool, typer.Option("--building", help="The seeds and sizes that may be looked into.")] = False,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for table and picture.")] = None,
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+) -> None:
+    """Are curves, letters, neighbours and lines on curved bodies told in kind, number, course and size? As CSV.
+
+    Example: explore3d bench shapes --store shapes.jsonl --shapes "S 10 mm,A" --seeds 2
+    """
+    from explore3d.bench.detection import bench_shapes, shape_lines, write_shapes
+    from explore3d.bench.scenes import FELT_SHAPES, FIRST_BUILT_WITH
+
+    first = FIRST_BUILT_WITH if building else 0
+    chosen = _names(shapes, "--shapes", list(FELT_SHAPES))
+    records = []
+    for each in bench_shapes(chosen, range(first, first + seeds), store, seconds):
+        records.append(each)
+        told = ", ".join(each["kinds"]) or "nothing"
+        print(f"{each['shape']}, {each['seed']}: {each['judged']} ({told}), {each['cpu']:.1f} s", flush=True)
+    _print(shape_lines(records))
+    if out is not None and records:
+        _print(str(path) for path in write_shapes(records, out))
+
+
+@bench.command()
 def profiles(
     forms: Annotated[str | None, typer.Option(help="Forms, separated by commas; all if left out.")] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Profiles of each form.")] = 10,

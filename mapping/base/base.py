@@ -71,7 +71,7 @@ class Base:
     Args:
         surface: its mesh.
         kind: "mesh" if it was given, else the fitted family: "profile", "plane", "sphere", "cylinder",
-            "quadric", "sheet", "polyhedron", "tube", "star body".
+            "quadric", "sheet", "extrusion", "polyhedron", "tube", "star body".
         parameters: what the fit found, by the family's own names (SI), empty for a given mesh.
         missed: by how much a fitted base missed sweeps that it was not fitted to, m; None of one that was not tested.
         pose: the motion from the given mesh to where the object stands; None of one that stands as given.

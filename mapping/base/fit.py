@@ -11,6 +11,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray, FormError, IntArray, Trace, TraceError
 from mapping.base.base import Base
 from mapping.base.cells import Cells, rows_of
+from mapping.base.extrusion import extrusion
 from mapping.base.polyhedron import polyhedron
 from mapping.base.profiles import AUTO, Form, fit_profile, profile_frame
 from mapping.base.quadrics import (
@@ -28,9 +29,8 @@ from mapping.base.quadrics import (
     sheet,
     sphere,
 )
-from mapping.base.star import star
+from mapping.base.round_bodies import star, tube
 from mapping.base.terraces import END_SHARE, terraced_plane, terraced_quadric
-from mapping.base.tube import tube
 from mapping.geometry.mesh import NearestPoint
 from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_scale, robust_sd, unshared
 
@@ -42,7 +42,7 @@ FREE: tuple[Family, ...] = (
     *(partial(star, degree=degree) for degree in (3, 5, 8, 12)),
 )
 # By how many times the scatter of neighbouring cells half of all cells may miss what keeps freer families from being
-# tried: a simple one, and a polyhedron, which comes near to anything round with enough faces
+# tried: a simple one, and an extrusion or a polyhedron, which come near to anything round with enough bends or faces
 EXPLAINED, EXACTLY = 5.0, 1.0
 
 
@@ -52,6 +52,7 @@ SIMPLE: dict[str, tuple[Family, ...]] = {
     "quadric": (quadric, terraced_quadric),
     "cylinder": (cylinder,),
     "sphere": (sphere,),
+    "extrusion": (extrusion,),
 }
 # Share of the sweeps that may seem to pass through a body: by single wrong readings
 MOST_WALKED = 0.25
@@ -81,8 +82,8 @@ def fit_base(
     A trace along one line gives a profile. Otherwise every family is fitted to the ball centres by robust
     least squares, and the one with the best truncated evidence is taken: a detail counts as an outlier, a
     further parameter must pay for itself. Where no plane, sphere, cylinder, quadric or stiff sheet comes near most of
-    the trace, polyhedra are tried, then supple sheets, tubes and star-shaped bodies. The base is the fitted surface's
-    parallel, one tip radius inward.
+    the trace, extrusions are tried, then polyhedra, supple sheets, tubes and star-shaped bodies. The base is the
+    fitted surface's parallel, one tip radius inward.
 
     Which side is outside is taken from the contact normals; without them it is the side of +z for sheets
     and away from the centre for round bodies, unless all of it was felt below the centre, as in a bowl.
@@ -117,8 +118,10 @@ def fit_base(
         raise FormError(f"form {form.kind!r}: none of its bodies can be fitted to this trace; possible: auto, line")
     # levels explain the top of a block and of the table beneath it: its sides ask for a body
     if form.kind == "auto" and all(_missed(fit, cloud) > EXPLAINED for fit in fits if "levels" not in fit.parameters):
-        bodies = _last_resort((polyhedron,), cloud)
-        fits += [body for body in bodies if not _walked_through(body, cloud, trace)]
+        fits += _fits((extrusion,), cloud)
+        if all(_missed(fit, cloud) > EXACTLY for fit in fits):
+            bodies = _last_resort((polyhedron,), cloud)
+            fits += [body for body in bodies if not _walked_through(body, cloud, trace)]
         if all(_missed(fit, cloud) > EXACTLY for fit in fits):
             fits += _last_resort(FREE, cloud)
     residual = min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual

@@ -230,7 +230,7 @@ def _height_mesh(
     normal = np.column_stack([-du, -dv, np.ones_like(du)])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     points = np.column_stack([uu, vv, w]) - cloud.tip_radius * normal
-    return Surface(cloud.world(points), _grid_faces(len(u), len(v)))
+    return Surface(cloud.world(points), grid_faces(len(u), len(v)))
 
 
 def pieces_of(length: float, spacing: float | None) -> int:
@@ -238,7 +238,8 @@ def pieces_of(length: float, spacing: float | None) -> int:
     return 1 if spacing is None else int(np.clip(np.ceil(length / spacing), 1, 500))
 
 
-def _grid_faces(rows: int, columns: int) -> IntArray:
+def grid_faces(rows: int, columns: int) -> IntArray:
+    """Triangles of a grid of vertices, row by row, outward if rows, columns and the outside are right-handed."""
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     right, up = corner + columns, corner + 1
     return np.concatenate([np.column_stack([corner, right, up]), np.column_stack([right, right + 1, up])])

@@ -68,6 +68,13 @@ if TYPE_CHECKING:
         section_body as section_body,
         section_trace as section_trace,
     )
+    from explore3d.bench.scenes.shapes import (
+        FELT_SHAPES as FELT_SHAPES,
+        SHAPE_PITCH as SHAPE_PITCH,
+        FeltShape as FeltShape,
+        felt_shape as felt_shape,
+        resampled as resampled,
+    )
     from explore3d.bench.scenes.wrong_models import (
         REPORTED as REPORTED,
         WRONG_BODIES as WRONG_BODIES,
@@ -97,6 +104,7 @@ _PUBLIC = {
         "section_body",
         "section_trace",
     ),
+    "shapes": ("FeltShape", "FELT_SHAPES", "SHAPE_PITCH", "felt_shape", "resampled"),
     "wrong_models": ("REPORTED", "WRONGS", "WRONG_BODIES", "wrong_model"),
 }
 doorway(__name__, _PUBLIC)

@@ -113,8 +113,8 @@ def test_a_block_has_its_six_faces_and_explains_the_way_round_its_edges() -> Non
 def test_a_valley_keeps_its_crease() -> None:
     lines = valley(np.radians(20.0))
     base = fit_base(swept(lines))
-    assert base.kind == "polyhedron"
-    assert base.parameters["hollow"]
+    assert base.kind == "extrusion"
+    assert base.parameters["radii"] == [0.0]
     assert missed(base, lines).max() < 2.0 * NOISE
 
 
