@@ -41,13 +41,14 @@ from mapping.geometry.mesh import (
     vector,
 )
 
-# Queries of a packet, and triangles that it may have: one that has at most half of them grows, one of too many is
-# answered query by query. Samples 6 um apart under a ball of 10 mm are answered three times as fast in packets, a grid
-# of a tenth of the triangles' sides a tenth faster; with half as many triangles it is the same within 5 %
+# Queries of a packet; triangles that it may have for each of them, and in all. One that has at most half of all grows,
+# queries of one of too many are answered by themselves. Samples 6 um apart under a ball of 10 mm are answered three
+# times as fast in packets, a grid of a tenth of the triangles' sides a tenth faster
 LEAST_QUERIES, MOST_QUERIES = 4, 32
-MOST_TRIANGLES = 4 * WIDTH
-# Queries that are answered by themselves after a packet of too many, and twice as many after each further one
-FIRST_PAUSE = 16
+TRIANGLES_PER_QUERY, MOST_TRIANGLES = 8, 4 * WIDTH
+# Queries that are answered by themselves where a packet has too many, and twice as many at each further one: the
+# search for what it would have had is lost
+FIRST_PAUSE = 64
 # Directions of a packet differ by this much at most
 TURN = 0.1
 
@@ -72,22 +73,30 @@ def first_contacts(  # type: ignore[no-untyped-def]
     own_leaves = np.zeros((MOST_TRIANGLES // WIDTH, leaves.shape[1], WIDTH), np.float32)
     own_links, own = np.empty((MOST_TRIANGLES // WIDTH, 2), np.int32), np.empty(MOST_TRIANGLES, np.int32)
     ways = np.empty((MOST_QUERIES, 9))
-    guess, width, alone, pause = -1, LEAST_QUERIES, 0, FIRST_PAUSE
+    guess, width, pause = -1, LEAST_QUERIES, FIRST_PAUSE
     at = first
     while at < last:
         if at % QUERIES_PER_BLOCK == 0:
-            guess, width, alone, pause = -1, LEAST_QUERIES, 0, FIRST_PAUSE
-        queries = min(width if guess >= 0 and alone == 0 else 1, QUERIES_PER_BLOCK - at % QUERIES_PER_BLOCK, last - at)
-        for k in range(queries):
-            q = turn[at + k] if len(turn) > 0 else at + k
-            set_out(origins, directions, q, frame, 1.001 * (size + ball[1]), ways[k])
-        held = 0
+            guess, width, pause = -1, LEAST_QUERIES, FIRST_PAUSE
+        left = min(QUERIES_PER_BLOCK - at % QUERIES_PER_BLOCK, last - at)
+        queries, held = min(width if guess >= 0 else 1, left), 0
         if queries > 1:
+            for k in range(queries):
+                q = turn[at + k] if len(turn) > 0 else at + k
+                set_out(origins, directions, q, frame, 1.001 * (size + ball[1]), ways, k)
             held = gather(
                 rows, order, leaves, boxes, links, ball, guess, ways, queries, stack, apart, late,
                 own_rows, own_order, own_leaves, own_links, own,
             )  # fmt: skip
-        if held > 0:
+            if held == 0:
+                width, queries, pause = max(width // 2, LEAST_QUERIES), min(pause, left), 2 * pause
+        if held == 0:
+            guess = by_themselves(
+                rows, order, leaves, boxes, links, ball, size, frame, turn, at, queries, origins, directions, guess,
+                ways, stack, apart, late, near, steps, touched, places,
+                centers, points, normals, feature, count, distance, overlap,
+            )  # fmt: skip
+        else:
             own_guess, pause = 0, FIRST_PAUSE
             for k in range(queries):
                 waiting = (held + WIDTH - 1) // WIDTH
@@ -102,23 +111,30 @@ def first_contacts(  # type: ignore[no-untyped-def]
             guess = own[own_guess]
             if held <= MOST_TRIANGLES // 2:
                 width = min(2 * width, MOST_QUERIES)
-        else:
-            if queries > 1:
-                width, alone, pause = max(width // 2, LEAST_QUERIES), pause, min(2 * pause, QUERIES_PER_BLOCK)
-                queries = 1
-            alone = max(alone - 1, 0)
-            stack[0] = len(links) - 1
-            q = turn[at] if len(turn) > 0 else at
-            guess = answer(
-                rows, order, leaves, boxes, links, ball, frame, ways, 0, ways[0, 7], -1, guess,
-                1, stack, apart, late, near, steps, touched, places,
-                q, centers, points, normals, feature, count, distance, overlap,
-            )  # fmt: skip
         at += queries
 
 
+@borrowing
+def by_themselves(  # type: ignore[no-untyped-def]
+    rows, order, leaves, boxes, links, ball, size, frame, turn, at, queries, origins, directions, guess,
+    ways, stack, apart, late, near, steps, touched, places,
+    centers, points, normals, feature, count, distance, overlap,
+):  # fmt: skip
+    """Answer so many queries in turn among all triangles; returns the triangle to try next."""
+    for k in range(at, at + queries):
+        q = turn[k] if len(turn) > 0 else k
+        set_out(origins, directions, q, frame, 1.001 * (size + ball[1]), ways, 0)
+        stack[0] = len(links) - 1
+        guess = answer(
+            rows, order, leaves, boxes, links, ball, frame, ways, 0, ways[0, 7], -1, guess,
+            1, stack, apart, late, near, steps, touched, places,
+            q, centers, points, normals, feature, count, distance, overlap,
+        )  # fmt: skip
+    return guess
+
+
 @inlined
-def set_out(origins, directions, q, frame, around, way):  # type: ignore[no-untyped-def]
+def set_out(origins, directions, q, frame, around, ways, k):  # type: ignore[no-untyped-def]
     """Write a query's way but its bound. `around`: radius of a sphere around the body and the ball on it."""
     per_unit = 1.0 / frame[3]
     o = (
@@ -128,9 +144,9 @@ def set_out(origins, directions, q, frame, around, way):  # type: ignore[no-unty
     )
     d = vector(directions, q if len(directions) > 1 else 0)
     start, length = way_to_body(o, d, around)
-    way[0], way[1], way[2] = moved(o, start, d)  # a far origin costs no digits from here on
-    way[3], way[4], way[5] = d
-    way[6], way[7] = start, length
+    ways[k, 0], ways[k, 1], ways[k, 2] = moved(o, start, d)  # a far origin costs no digits from here on
+    ways[k, 3], ways[k, 4], ways[k, 5] = d
+    ways[k, 6], ways[k, 7] = start, length
 
 
 @borrowing
@@ -188,7 +204,7 @@ def gather(  # type: ignore[no-untyped-def]
         waiting -= 1
         if i == guess or stays_above(rows, i, stop, d, reach):
             continue
-        if held == MOST_TRIANGLES:
+        if held == min(MOST_TRIANGLES, TRIANGLES_PER_QUERY * queries):
             return 0
         lay_out(rows, order, leaves, i, held, own_rows, own_order, own_leaves, own)
         held += 1
