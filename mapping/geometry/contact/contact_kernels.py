@@ -9,13 +9,7 @@ from __future__ import annotations
 
 from math import inf, nan, sqrt
 
-import numpy as np
-from numba import njit
-
 from mapping.geometry.mesh import (
-    QUERIES_PER_BLOCK,
-    STACK,
-    WIDTH,
     borrowing,
     closest,
     closing_step,
@@ -27,12 +21,10 @@ from mapping.geometry.mesh import (
     inlined,
     moved,
     push_lanes,
-    scaled,
     sub,
     vector,
 )
 
-PASSES, TOUCHES, OVERLAPS = 0, 1, 2
 CONTACT_TOLERANCE = 1e-9  # relative to the radius: what lies this close to the resting ball touches it
 # relative to the radius, sqrt(8 CONTACT_TOLERANCE): dents narrower than this are shallower than CONTACT_TOLERANCE
 DISTINCT_CONTACT_GAP = 9e-5
@@ -48,7 +40,7 @@ def stays_above(rows, i, end, d, reach):  # type: ignore[no-untyped-def]
     return abs(height) > reach and height * dot(d, n) >= 0.0
 
 
-@borrowing
+@inlined
 def meet(rows, i, o, d, ball, start, far):  # type: ignore[no-untyped-def]
     """When a ball free at o meets the triangle: 0 <= t < far, inf if never, -1 if it overlaps it at o.
 
@@ -62,22 +54,16 @@ def meet(rows, i, o, d, ball, start, far):  # type: ignore[no-untyped-def]
     return enter_triangle(a, b, c, n, d, ball, start, far)
 
 
-@borrowing
-def first_touch(rows, leaves, boxes, links, ball, o, d, far, guess, near, stack, apart, late):  # type: ignore[no-untyped-def]
-    """Search for the earliest contact before `far`, triangle `guess` first.
+@inlined
+def first_touch(rows, leaves, boxes, links, ball, o, d, best, hit, near, stack, waiting, apart, late):  # type: ignore[no-untyped-def]
+    """Search for the earliest contact before `best`, when the triangle `hit` is met (-1: no contact is known yet).
 
-    Returns (t, triangle or -1, kept): near[:kept] are all triangles that may touch at t.
-    t = -1: the ball overlaps the triangle at the start.
+    The nodes stack[:waiting] are searched. Returns (t, triangle or -1, kept): near[:kept] are all triangles that may
+    touch at t. t = -1: the ball overlaps the triangle at the start.
     """
     radius, reach, graze = ball
-    best, hit, kept = far, -1, 0
-    if guess >= 0:
-        t = meet(rows, guess, o, d, ball, 0.0, best)
-        if t < best:
-            best, hit = t, guess
+    kept = 0
     end = moved(o, best, d)
-    stack[0] = len(links) - 1
-    waiting = 1
     while waiting > 0 and best >= 0.0:
         i = -1 - stack[waiting - 1]
         if i < 0:
@@ -112,12 +98,13 @@ def further(p, d, radius):  # type: ignore[no-untyped-def]
     return (gap - radius) / cosine if cosine > GLANCING else inf
 
 
-@borrowing
-def settle(rows, order, near, steps, kept, hit, o, d, ball):  # type: ignore[no-untyped-def]
+@inlined
+def settle(rows, order, near, steps, touched, kept, hit, o, d, ball):  # type: ignore[no-untyped-def]
     """(triangle, step, kept): which of the near triangles stops the ball first, and how much further along d than o.
 
     Of those that differ by rounding it is the face of the lowest number: no order of search can change that.
-    near[:kept] shrinks to the triangles within reach. steps: room for as many numbers as `near` has.
+    near[:kept] shrinks to the triangles within reach. steps, touched: room for a number and a point, relative to o, of
+    each triangle that `near` has room for.
     """
     radius, reach, graze = ball
     own, least, stay = nan, inf, 0
@@ -128,6 +115,7 @@ def settle(rows, order, near, steps, kept, hit, o, d, ball):  # type: ignore[no-
             own = step
         if dot(p, p) <= reach * reach:
             near[stay], steps[stay] = near[i], step
+            touched[stay, 0], touched[stay, 1], touched[stay, 2] = p
             stay += 1
             least = min(least, step)
     if own != own:
@@ -141,17 +129,20 @@ def settle(rows, order, near, steps, kept, hit, o, d, ball):  # type: ignore[no-
     return first if first >= 0 else hit, least, stay
 
 
-@borrowing
-def count_contacts(rows, near, kept, touched, first, o, ball, points):  # type: ignore[no-untyped-def]
-    """Number of distinct places of the near triangles that a ball at o touches, `first` (relative to o), that of the
-    triangle `touched`, among them."""
+@inlined
+def count_contacts(near, touched, kept, more, d, own, first, ball, points):  # type: ignore[no-untyped-def]
+    """Number of distinct places that a ball touches which rests `more` further along d than where it touches the points
+    `touched` (K, 3) of the near triangles: `first`, that of the triangle `own`, among them.
+
+    That is further by rounding only, and so are the places on the triangles.
+    """
     apart = DISTINCT_CONTACT_GAP * ball[0]
     found = 1
     points[0, 0], points[0, 1], points[0, 2] = first
     for i in range(kept):
-        if near[i] == touched:
+        if near[i] == own:
             continue
-        p = closest(rows, near[i], o)
+        p = moved(vector(touched, i), -more, d)
         new = found < MOST_DISTINCT_CONTACTS and dot(p, p) <= ball[1] * ball[1]
         for j in range(found):
             w = sub(p, vector(points, j))
@@ -162,7 +153,7 @@ def count_contacts(rows, near, kept, touched, first, o, ball, points):  # type: 
     return found
 
 
-@borrowing
+@inlined
 def feature_of(rows, i, o, p, rounding):  # type: ignore[no-untyped-def]
     """1 face, 2 edge, 3 vertex: the smallest part of the triangle that holds the point p relative to o."""
     a, b, c, _ = corners(rows, i, o)
@@ -189,42 +180,3 @@ def way_to_body(o, d, around):  # type: ignore[no-untyped-def]
         return 0.0, -1.0
     start = max(0.0, middle - half)
     return start, middle + half - start
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def first_contacts(  # type: ignore[no-untyped-def]
-    rows, order, leaves, boxes, links, ball, size, origins, directions, where, feature, count, distance, state
-):  # fmt: skip
-    """Fill the outputs for every query: `where` (N, 3, 3) with centre, point and normal.
-
-    `size` is the radius of a sphere around the body.
-    """
-    stack, places = np.empty(STACK, np.int32), np.empty((MOST_DISTINCT_CONTACTS, 3))
-    near, steps = np.empty(len(rows), np.int32), np.empty(len(rows))
-    apart, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
-    guess = -1
-    for q in range(len(origins)):
-        if q % QUERIES_PER_BLOCK == 0:
-            guess = -1
-        o, d = vector(origins, q), vector(directions, q if len(directions) > 1 else 0)
-        for k in range(3):
-            where[q, 0, k] = where[q, 1, k] = where[q, 2, k] = nan
-        feature[q], count[q], distance[q], state[q] = 0, 0, inf, PASSES
-        start, length = way_to_body(o, d, 1.001 * (size + ball[1]))
-        if length < 0.0:
-            continue
-        o = moved(o, start, d)  # a far origin costs no digits from here on
-        t, hit, kept = first_touch(rows, leaves, boxes, links, ball, o, d, length, guess, near, stack, apart, late)
-        if t < 0.0:
-            state[q], distance[q] = OVERLAPS, 0.0
-        elif hit >= 0:
-            o, guess, state[q] = moved(o, t, d), hit, TOUCHES
-            i, more, kept = settle(rows, order, near, steps, kept, hit, o, d, ball)
-            o = moved(o, more, d)
-            p = closest(rows, i, o)
-            n, at = scaled(-1.0 / sqrt(dot(p, p)), p), moved(o, 1.0, p)
-            for k in range(3):
-                where[q, 0, k], where[q, 1, k], where[q, 2, k] = o[k], at[k], n[k]
-            feature[q] = feature_of(rows, i, o, p, ball[2])
-            count[q] = count_contacts(rows, near, kept, i, p, o, ball, places)
-            distance[q] = max(start + t + more, 0.0)

@@ -112,38 +112,24 @@ class BallContact:
         Raises:
             ContactError: wrong shapes, values that are not finite, a direction of length zero.
         """
-        from mapping.geometry.contact import contact_kernels
+        from mapping.geometry.contact import packet_kernels
         from mapping.geometry.mesh import QUERIES_PER_BLOCK
 
         start = checked_points(origins, "origins")
-        way = unit_directions(directions, len(start))
-        local, tree = self._tree.into(start), self._tree
-        order = morton_order(local)
-        if order is not None:
-            local, way = local[order], way[order] if len(way) == len(start) else way
-        where, feature = np.empty((len(start), 3, 3)), np.empty(len(start), np.int8)
-        count, distance, state = np.empty(len(start), np.int64), np.empty(len(start)), np.empty(len(start), np.int8)
+        way, tree = unit_directions(directions, len(start)), self._tree
+        turn = morton_order(start)
+        centers, points, normals = (np.empty((len(start), 3)) for _ in range(3))
+        feature, count, distance = np.empty(len(start), np.int8), np.empty(len(start), np.int64), np.empty(len(start))
+        overlap = np.empty(len(start), np.bool_)
 
         def some(part: slice) -> None:
-            ways = way[part] if len(way) == len(start) else way
-            contact_kernels.first_contacts(
-                tree.rows, tree.order, tree.leaves, tree.boxes, tree.links, self._ball, tree.size, local[part], ways,
-                where[part], feature[part], count[part], distance[part], state[part],
+            packet_kernels.first_contacts(
+                tree.rows, tree.order, tree.leaves, tree.boxes, tree.links, self._ball, tree.size, tree.frame,
+                turn, part.start, part.stop, start, way, centers, points, normals, feature, count, distance, overlap,
             )  # fmt: skip
 
         _in_parts(some, len(start), QUERIES_PER_BLOCK, threads)
-        if order is not None:
-            for array in (where, feature, count, distance, state):
-                array[order] = array.copy()
-        return Contacts(
-            tree.out(where[:, 0]),
-            tree.out(where[:, 1]),
-            where[:, 2].copy(),
-            feature,
-            count,
-            tree.scale_out(distance),
-            state == contact_kernels.OVERLAPS,
-        )
+        return Contacts(centers, points, normals, feature, count, distance, overlap)
 
     def press(self, centers: ArrayLike, approach: ArrayLike, threads: int = 1) -> Contacts:
         """Where balls rest that are commanded to the centres and pressed along the approach, each on its own.

@@ -15,23 +15,11 @@ BITS = 10
 IN_ROWS = 4.0
 
 
-def morton_order(points: FloatArray) -> IntArray | None:
-    """(N,) the points (N, 3) along a Morton curve (Morton 1966); None where they follow one another closely already."""
-    if len(points) < 2:
-        return None
-    low, high = (np.array([end(column) for column in points.T]) for end in (np.min, np.max))  # numpy is slow along rows
-    extent = float((high - low).max())
-    steps = np.diff(points, axis=0)
-    step = float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).mean())
-    if not np.isfinite(extent) or step * np.sqrt(len(points)) <= IN_ROWS * extent:
-        return None
-    cells = np.minimum((points - low) * (2**BITS / extent), 2**BITS - 1).astype(np.uint32)
-    codes = _spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint32(1) | _spread(cells[:, 2]) << np.uint32(2)
-    return np.argsort(codes, kind="stable")
+def morton_order(points: FloatArray) -> IntArray:
+    """(N,) the points (N, 3) along a Morton curve (Morton 1966); none where they follow one another closely already."""
+    from mapping.geometry.contact.order_kernels import along_curve, in_rows
 
-
-def _spread(bits: np.ndarray) -> np.ndarray:
-    """The ten low bits, each with two zeros before it."""
-    for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
-        bits = (bits | bits << np.uint32(shift)) & np.uint32(mask)
-    return bits
+    none = np.empty(0, dtype=np.int64)
+    if len(points) < 2 or in_rows(points, IN_ROWS):
+        return none
+    return np.asarray(along_curve(points, BITS))

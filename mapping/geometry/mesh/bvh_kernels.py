@@ -11,12 +11,13 @@ import numpy as np
 from numba import njit
 
 from mapping.geometry.mesh.borrowing_kernels import borrowing, inlined
-from mapping.geometry.mesh.vector_kernels import dot, moved, sub
+from mapping.geometry.mesh.vector_kernels import dot, moved
 
 WIDTH = 16
 STACK = 512  # 32 bit numbers of triangles make at most 8 levels, each leaving at most 15 lanes waiting
 BOX_ROUNDING = 6e-6  # what float32 boxes and paths may be off by, in lengths of the scaled body
 NOWHERE = 1e18  # a box that no path comes near
+LEAST_SIDE_SQUARE = 1e-30  # of squared lengths, so that a side without length is no division by 0
 
 F4 = np.float32
 
@@ -104,11 +105,10 @@ def part(keys, order, first, end, cut, axis):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def build_tree(rows):  # type: ignore[no-untyped-def]
-    """The tree over triangles (F, >= 9) in leaf order. Nodes count from the leaves; the last one is the root.
+    """The tree over the rows (F, 12) of triangles in leaf order. Nodes count from the leaves; the last one is the root.
 
     Returns:
-        leaves: (L, 10, WIDTH) float32, of each lane's triangle the nine coordinates of its corners and a third of
-            its longest side squared.
+        leaves: (L, 12, WIDTH) float32, of each lane's triangle the nine coordinates of its corners and its unit normal.
         boxes: (M, 6, WIDTH) float32, of each lane of the other nodes the smallest and largest coordinates.
         links: (L + M, 2) int32: node in lane 0 (the others follow) or, of a leaf, -1 - triangle in lane 0; number
             of lanes in use.
@@ -118,13 +118,12 @@ def build_tree(rows):  # type: ignore[no-untyped-def]
     while level > 1:
         level = (level + WIDTH - 1) // WIDTH
         others += level
-    leaves = np.full((count, 10, WIDTH), F4(NOWHERE))
+    leaves = np.full((count, 12, WIDTH), F4(NOWHERE))
     boxes = np.full((others, 6, WIDTH), F4(NOWHERE))
     links = np.empty((count + others, 2), np.int32)
     for i in range(len(rows)):
-        for k in range(9):
+        for k in range(12):
             leaves[i // WIDTH, k, i % WIDTH] = rows[i, k]
-        leaves[i // WIDTH, 9, i % WIDTH] = longest_square(rows, i) / 3.0
     for i in range(count):
         links[i, 0], links[i, 1] = -1 - WIDTH * i, min(WIDTH, len(rows) - WIDTH * i)
     below, first = 0, count
@@ -136,15 +135,6 @@ def build_tree(rows):  # type: ignore[no-untyped-def]
             links[first + i, 0], links[first + i, 1] = below + WIDTH * i, min(WIDTH, count - WIDTH * i)
         below, first, count = first, first + parents, parents
     return leaves, boxes, links
-
-
-@borrowing
-def longest_square(rows, i):  # type: ignore[no-untyped-def]
-    """Longest side of a triangle, squared."""
-    a, b = (rows[i, 0], rows[i, 1], rows[i, 2]), (rows[i, 3], rows[i, 4], rows[i, 5])
-    c = (rows[i, 6], rows[i, 7], rows[i, 8])
-    u, v, w = sub(b, a), sub(c, b), sub(a, c)
-    return max(dot(u, u), dot(v, v), dot(w, w))
 
 
 @borrowing
@@ -176,28 +166,59 @@ def enclose(leaves, boxes, links, node, parent, lane):  # type: ignore[no-untype
 
 
 @inlined
-def leaf_tests(leaves, node, end, d, reach, apart):  # type: ignore[no-untyped-def]
-    """`box_tests` for the triangles of a leaf.
+def square_to_segment(ax, ay, az, ux, uy, uz):  # type: ignore[no-untyped-def]
+    """Squared distance of the origin from the segment from a to a + u."""
+    share = -(ax * ux + ay * uy + az * uz) / max(ux * ux + uy * uy + uz * uz, F4(LEAST_SIDE_SQUARE))
+    share = min(max(share, F4(0.0)), F4(1.0))
+    x, y, z = ax + share * ux, ay + share * uy, az + share * uz
+    return x * x + y * y + z * z
 
-    On fine meshes sharper than their boxes: for a point p = sum w_i v_i of a triangle, |p|^2 is
-    sum w_i |v_i|^2 - sum w_i w_j |v_i - v_j|^2, and the last sum is at most a third of the longest side squared.
+
+@inlined
+def leaf_tests(leaves, node, end, d, reach, apart):  # type: ignore[no-untyped-def]
+    """`box_tests` for the triangles of a leaf: of those that lie ahead as a whole it is their own distance.
+
+    It is that of the foot on the plane if the triangle holds it, else that of the nearest side. Rounding may take a
+    foot for outside that is inside by epsilons of its distance over the side; seen from there, that adds less than
+    BOX_ROUNDING.
     """
     ex, ey, ez, dx, dy, dz = F4(end[0]), F4(end[1]), F4(end[2]), F4(d[0]), F4(d[1]), F4(d[2])
-    zero, behind, square = F4(0.0), F4(-1.0), F4(reach * reach)
+    zero, behind = F4(0.0), F4(-1.0)
     for i in range(leaves.shape[2]):
         ax, ay, az = leaves[node, 0, i] - ex, leaves[node, 1, i] - ey, leaves[node, 2, i] - ez
         bx, by, bz = leaves[node, 3, i] - ex, leaves[node, 4, i] - ey, leaves[node, 5, i] - ez
         cx, cy, cz = leaves[node, 6, i] - ex, leaves[node, 7, i] - ey, leaves[node, 8, i] - ez
+        mx, my, mz = leaves[node, 9, i], leaves[node, 10, i], leaves[node, 11, i]
         nx = max(min(min(ax, bx), cx), zero) + min(max(max(ax, bx), cx), zero)
         ny = max(min(min(ay, by), cy), zero) + min(max(max(ay, by), cy), zero)
         nz = max(min(min(az, bz), cz), zero) + min(max(max(az, bz), cz), zero)
         box = nx * nx + ny * ny + nz * nz if nx * dx + ny * dy + nz * dz >= zero else behind
         ahead = min(min(ax * dx + ay * dy + az * dz, bx * dx + by * dy + bz * dz), cx * dx + cy * dy + cz * dz)
-        near = min(min(ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz), cx * cx + cy * cy + cz * cz)
-        third = leaves[node, 9, i]
-        near = near - third if ahead >= zero else behind
-        near = near if third <= square else behind  # else the difference has too few digits
-        apart[i] = max(box, near)
+        ux, uy, uz, vx, vy, vz, wx, wy, wz = (
+            bx - ax,
+            by - ay,
+            bz - az,
+            cx - bx,
+            cy - by,
+            cz - bz,
+            ax - cx,
+            ay - cy,
+            az - cz,
+        )
+        left = min(
+            min(
+                mx * (ay * uz - az * uy) + my * (az * ux - ax * uz) + mz * (ax * uy - ay * ux),
+                mx * (by * vz - bz * vy) + my * (bz * vx - bx * vz) + mz * (bx * vy - by * vx),
+            ),
+            mx * (cy * wz - cz * wy) + my * (cz * wx - cx * wz) + mz * (cx * wy - cy * wx),
+        )
+        height = ax * mx + ay * my + az * mz
+        side = min(
+            min(square_to_segment(ax, ay, az, ux, uy, uz), square_to_segment(bx, by, bz, vx, vy, vz)),
+            square_to_segment(cx, cy, cz, wx, wy, wz),
+        )
+        near = height * height if left > zero else side
+        apart[i] = max(box, near if ahead >= zero else behind)
 
 
 @inlined

@@ -7,7 +7,7 @@ from math import inf, nan, sqrt
 import numpy as np
 from numba import njit
 
-from mapping.geometry.mesh.borrowing_kernels import borrowing
+from mapping.geometry.mesh.borrowing_kernels import borrowing, inlined
 from mapping.geometry.mesh.bvh_kernels import BOX_ROUNDING, STACK, WIDTH, push_lanes
 from mapping.geometry.mesh.triangle_row_kernels import QUERIES_PER_BLOCK, closest, corners
 from mapping.geometry.mesh.vector_kernels import dot, moved, sub, vector
@@ -77,7 +77,7 @@ def part_of(weights):  # type: ignore[no-untyped-def]
     return INSIDE if zeros == 0 else ON_EDGE + out if zeros == 1 else ON_VERTEX + most
 
 
-@borrowing
+@inlined
 def nearest_triangle(rows, order, leaves, boxes, links, o, guess, stack, apart, late):  # type: ignore[no-untyped-def]
     """The triangle nearest to o, looked for in the neighbourhood that the distance of `guess` leaves."""
     best, still = guess, (0.0, 0.0, 0.0)

@@ -31,8 +31,15 @@ class TriangleTree:
         vertices = self.into(surface.vertices)
         self.order: NDArray[np.int32] = bvh_kernels.leaf_order(vertices, surface.faces)
         self.rows: FloatArray = triangle_row_kernels.lay_out(vertices, surface.faces, self.order)
+        del vertices  # a tenth of what the tree of a large mesh takes
         self.leaves, self.boxes, self.links = bvh_kernels.build_tree(self.rows)
         self.size = float(np.linalg.norm(np.abs(self.into(np.stack([low, high]))).max(axis=0)))
+
+    @property
+    def frame(self) -> tuple[float, float, float, float]:
+        """The origin of the tree's frame and its unit, m, a power of two."""
+        x, y, z = self._center.tolist()
+        return x, y, z, self._unit
 
     def into(self, points: FloatArray) -> FloatArray:
         """Points (N, 3), m, in the tree's frame."""

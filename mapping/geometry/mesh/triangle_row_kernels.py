@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from mapping.geometry.mesh.borrowing_kernels import borrowing
+from mapping.geometry.mesh.borrowing_kernels import inlined
 from mapping.geometry.mesh.triangle_kernels import closest_on_triangle, unit_normal
 
 QUERIES_PER_BLOCK = 1024  # queries that share their guesses: threads that take whole blocks give the same answers
@@ -24,7 +24,7 @@ def lay_out(vertices, faces, order):  # type: ignore[no-untyped-def]
     return rows
 
 
-@borrowing
+@inlined
 def corners(rows, i, o):  # type: ignore[no-untyped-def]
     """Corners of a triangle relative to o, and its normal."""
     a = (rows[i, 0] - o[0], rows[i, 1] - o[1], rows[i, 2] - o[2])
@@ -33,7 +33,7 @@ def corners(rows, i, o):  # type: ignore[no-untyped-def]
     return a, b, c, (rows[i, 9], rows[i, 10], rows[i, 11])
 
 
-@borrowing
+@inlined
 def closest(rows, i, o):  # type: ignore[no-untyped-def]
     """Point of a triangle closest to o, relative to o."""
     a, b, c, n = corners(rows, i, o)
