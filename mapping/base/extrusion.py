@@ -1,4 +1,4 @@
-"""Extrusion: planes and the arcs between them, swept along a straight line: a fillet, a roof, a bent sheet, a rail."""
+"""Extrusion: planes and the arcs between them, swept along a straight line: a fillet, a roof, a bent sheet."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mapping.base.quadrics import Cloud, Fitted, grid_faces, pieces_of
 from mapping.geometry.mesh import spline_design
 from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit
 
-# Bends of a section, at most: a rail or a bar on a plate has four
+# Bends of a section, at most: a gutter with a lip on either side has four
 MOST_ARCS = 4
 # Directions that the line is sought in, over half a turn, and straight pieces that the section is sought as: both only
 # begin the fit, which then turns freely
@@ -27,7 +27,7 @@ ROUGHLY = 3
 BEGUN_ROUND = (0.1, 2.0)
 # Rounds of parting what the body explains from what stands off it, until no cell changes
 PARTED_ROUNDS = 6
-# Steps of one fit: those that lead to a fillet, an edge, a corner and a rail take up to 20
+# Steps of one fit: those that lead to a fillet, an edge, a corner and a gutter take up to 20
 SECTION_STEPS = 40
 # Largest sine of a slope against the plane that most of the path lies in: 80 degrees
 STEEPEST_SINE = 0.985

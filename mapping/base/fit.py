@@ -66,6 +66,9 @@ OF_MEDIAN = 0.5 * np.pi
 # Rounds in which a base through the ends of sweeps takes in what lies as it does: each is a candidate, so that one
 # more costs a fit and decides nothing
 ENDS_ROUNDS = 3
+# Share of the sweeps' ends that lie on one plane, at least, where all of them do: of two sides of an edge each may have
+# up to nine tenths, and one in ten ends may be on a detail
+ALL_ENDS = 0.9
 # Families that a form admits over an area
 AREAL_FORMS: dict[str, tuple[Family, ...]] = {
     "auto": (*FAMILIES, terraced_plane, terraced_quadric),
@@ -118,7 +121,8 @@ def fit_base(
         raise FormError(f"form {form.kind!r}: none of its bodies can be fitted to this trace; possible: auto, line")
     # levels explain the top of a block and of the table beneath it: its sides ask for a body
     if form.kind == "auto" and all(_missed(fit, cloud) > EXPLAINED for fit in fits if "levels" not in fit.parameters):
-        fits += _fits((extrusion,), cloud)
+        if not _ends_in_a_plane(cloud):
+            fits += _fits((extrusion,), cloud)
         if all(_missed(fit, cloud) > EXACTLY for fit in fits):
             bodies = _last_resort((polyhedron,), cloud)
             fits += [body for body in bodies if not _walked_through(body, cloud, trace)]
@@ -243,6 +247,13 @@ def _of_ends(cloud: Cloud) -> list[Fitted]:
                 break
             found.append(fit)
     return found
+
+
+def _ends_in_a_plane(cloud: Cloud) -> bool:
+    """True if nearly all sweeps begin and end on one plane: what bends between its ends is a detail on it, or steps."""
+    ends = _ends(cloud.sweep)
+    fit = height_field(plane_design, "plane", cloud, among=ends)
+    return bool(np.mean(np.abs(fit.residual[ends]) < FEATURE_RESIDUAL_SDS * cloud.floor) > ALL_ENDS)
 
 
 def _ends(sweep: IntArray) -> BoolArray:

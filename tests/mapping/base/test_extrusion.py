@@ -1,4 +1,4 @@
-"""Bodies of planes and arcs along a straight line, felt without a mesh: fillets, edges, corners, rails."""
+"""Bodies of planes and arcs along a straight line, felt without a mesh: fillets, edges, corners, gutters."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ BODIES = {
     "fillet": ([(0.0, 1.0, 0.02)], -0.5),
     "sharp edge": ([(0.004, -0.7, TIP)], 0.35),
     "corner": ([(-0.003, 0.8, 0.0)], -0.4),
-    "rail": ([(-0.016, 0.6, 0.004), (-0.006, -0.6, 0.014), (0.006, -0.6, 0.014), (0.016, 0.6, 0.004)], 0.0),
+    "gutter": ([(-0.016, -0.6, 0.014), (-0.006, 0.6, 0.004), (0.006, 0.6, 0.004), (0.016, -0.5, 0.014)], 0.0),
 }
 
 
@@ -101,3 +101,9 @@ def test_a_ridge_across_all_of_a_plate_stays_a_detail_on_it() -> None:
     crest = np.maximum(0.6e-3 - trace.centers[:, 0] ** 2 / (2.0 * TIP), 0.0)
     ridged = Trace(trace.t, trace.centers + crest[:, None] * [0.0, 0.0, 1.0], trace.sweep, TIP)
     assert fit_base(ridged).kind == "plane"
+
+
+def test_a_rail_between_ends_on_one_plane_stays_a_detail_on_it() -> None:
+    """As rails are bodies' sections too, every wire and every step that all rows cross would be one."""
+    bends = [(-0.016, 0.6, 0.004), (-0.006, -0.6, 0.014), (0.006, -0.6, 0.014), (0.016, 0.6, 0.004)]
+    assert fit_base(felt(path_over(bends), 0.3)).kind == "plane"
