@@ -39,7 +39,7 @@ class SweepHeights:
         start: arclength of the first bin's middle, m.
         spacing: width of the bins, m.
         height: (n,) mean height over the base in each bin, m.
-        samples: samples per bin: white noise has one so many-th of its variance in the mean of all bins.
+        samples: samples per bin: white noise has one so many-th of its variance in half of the bins, or less.
         first: (n + 1,) index within the sweep of the first sample of each bin.
         t: (n,) mean times, s.
         centers: (n, 3) mean ball centres, m. Like heights and times they are those at the bins' middles.
@@ -182,7 +182,7 @@ def height_profiles(
                 float(s[0] + (wanted[0] + 0.5) * spacing - 0.5 * step),
                 spacing,
                 np.interp(wanted, have, height[begin:end]),
-                float(1.0 / _white_variance(np.diff(edges)).mean()),
+                float(1.0 / np.median(_white_variance(np.diff(edges)))),
                 edges,
                 np.interp(wanted, have, times[begin:end]),
                 middles,

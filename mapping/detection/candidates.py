@@ -96,13 +96,18 @@ class Searched:
         """All above the threshold; measured when they are asked for, which costs most of a search."""
         profile, bank, tip_radius, null = self.profile, self.bank, self.tip_radius, self.null
         found: list[Disturbance] = []
+        sampled = sampling(profile, bank) if null is None and self.stretches else None
         for height, begin, end, crest, snr in self.stretches:
             for low, high in _crests(height, begin, end, crest, profile, self.noise, tip_radius):
                 beside = (low > begin, high < end)
                 sign = float(np.sign(crest))
                 new = fit_cap(height, (low, high), sign, profile, self.noise, bank.drift, tip_radius, beside)
+                place = (new.place - profile.start) / profile.spacing
                 if null is not None:
-                    new = new.at_scale(null.at(new.half_width, (new.place - profile.start) / profile.spacing))
+                    new = new.at_scale(null.at(new.half_width, place))
+                elif sampled is not None:
+                    level = seen(sampled, new.half_width / profile.spacing)
+                    new = new.at_scale(float(np.interp(place, np.arange(len(level)), level)))
                 if not any(beside) and new.snr < snr:
                     new = replace(new, snr=snr)
                 certain = abs(new.height) >= MEASURED * self.threshold * new.height_sd

@@ -193,7 +193,8 @@ class _Heights:
     @classmethod
     def of(cls, laid: LaidTrace) -> _Heights:
         sweeps = laid.laid_sweeps[:: 1 + len(laid) // MOST_ASKED]
-        feet = [sweep.feet(slice(0, MOST_ASKED)) for sweep in sweeps]
+        # not kept: what follows goes by where the means of bins stand, unless all samples are laid
+        feet = [laid.base.foot(sweep.trace.centers[:MOST_ASKED], laid.tip_radius) for sweep in sweeps]
         changes = sum(int((np.diff(one.face) != 0).sum()) + 1 for one in feet)
         size = max(1, sum(len(one.face) for one in feet) // (BLOCKS_PER_FACET * max(changes, 1)))
         whole = [len(one.face) // size * size for one in feet]

@@ -133,14 +133,14 @@ def bare_profile(samples: np.ndarray, rng: np.random.Generator) -> SweepHeights:
     count = len(samples)
     first = np.concatenate([[0], np.cumsum(samples)]).round().astype(np.int64)
     height = rng.standard_normal(count) * 2e-4 / np.sqrt(samples)
-    mean = float(1.0 / np.mean(1.0 / samples))
-    return SweepHeights(0, 0.0, 1e-4, height, mean, first, np.arange(float(count)), np.zeros((count, 3)))
+    usual = float(np.median(samples))
+    return SweepHeights(0, 0.0, 1e-4, height, usual, first, np.arange(float(count)), np.zeros((count, 3)))
 
 
 def test_where_samples_are_scarce_the_noise_they_leave_is_no_feature():
     samples = np.full(10_000, 20.0)
     samples[3000:5000] = 3.0
-    bank = build_bank(Noise(2e-4), 1e-4, float(1.0 / np.mean(1.0 / samples)), 1.4e-3, 0.02)
+    bank = build_bank(Noise(2e-4), 1e-4, float(np.median(samples)), 1.4e-3, 0.02)
     threshold, rng = threshold_for(bank, 1.0), np.random.default_rng(8)
     found = sum(
         len(search(bare_profile(samples, rng), bank, bank.noise, threshold, TIP).disturbances) for _ in range(12)
