@@ -17,8 +17,9 @@ from mapping.estimate.deviation.reshaped import MOST_REFINED_FACES
 from mapping.geometry.mesh import CREASE_ANGLE
 from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_sd
 
-# Samples that are asked: sweeps are left out evenly beyond that
-MOST_ASKED = 40_000
+# Samples that are asked, from the middles of the sweeps, and the fewest of each: as many as tell the noise, which are
+# laid on the base anyway
+MOST_ASKED, FEWEST_ASKED = 40_000, 64
 # Neighbours belong to one patch if neither bulges more than so many times as the other would: on one round body facets
 # differ in size, but the flat beside a fillet, whose corners' normals lean to both, would bulge by a share of its own
 # length and not of a facet's
@@ -192,16 +193,18 @@ class _Heights:
 
     @classmethod
     def of(cls, laid: LaidTrace) -> _Heights:
-        sweeps = laid.laid_sweeps[:: 1 + len(laid) // MOST_ASKED]
-        # not kept: what follows goes by where the means of bins stand, unless all samples are laid
-        feet = [laid.base.foot(sweep.trace.centers[:MOST_ASKED], laid.tip_radius) for sweep in sweeps]
+        share = max(FEWEST_ASKED, MOST_ASKED // max(len(laid.laid_sweeps), 1))
+        begins = [max(0, len(sweep.trace) - share) // 2 for sweep in laid.laid_sweeps]
+        parts = [slice(begin, begin + share) for begin in begins]
+        feet = [sweep.feet(part) for sweep, part in zip(laid.laid_sweeps, parts, strict=True)]
         changes = sum(int((np.diff(one.face) != 0).sum()) + 1 for one in feet)
         size = max(1, sum(len(one.face) for one in feet) // (BLOCKS_PER_FACET * max(changes, 1)))
         whole = [len(one.face) // size * size for one in feet]
         height = [one.height[:n].reshape(-1, size).mean(axis=1) for one, n in zip(feet, whole, strict=True)]
         face = [one.face[:n].reshape(-1, size)[:, size // 2] for one, n in zip(feet, whole, strict=True)]
         number = np.repeat(np.arange(len(feet)), [len(each) for each in height])
-        centers = [sweep.trace.centers[:n] for sweep, n in zip(sweeps, whole, strict=True)]
+        each = zip(laid.laid_sweeps, parts, whole, strict=True)
+        centers = [sweep.trace.centers[part][:n] for sweep, part, n in each]
         return cls(np.concatenate(centers), size, np.concatenate(height), np.concatenate(face), np.diff(number) == 0)
 
     def over(self, base: Base, tip_radius: float) -> FloatArray:

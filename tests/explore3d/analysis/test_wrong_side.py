@@ -47,6 +47,7 @@ def test_a_wire_in_a_bore_and_one_on_a_shaft_are_both_ridges(tmp_path: Path, ins
     assert any("felt from inside" in line for line in summary(found)) == inside
 
 
+@pytest.mark.slow
 def test_a_plate_whose_z_points_into_it_is_named_first(tmp_path: Path) -> None:
     x = np.arange(0.0, 20.0, 0.05)
     wire = np.maximum(1.0, 0.1 + np.sqrt(np.maximum(1.1**2 - (x - 10.0) ** 2, 0.0)))

@@ -16,6 +16,7 @@ from hw.grbl.guarded_stage import GuardedStage
 STEP = 4e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("latency", [0.0, pytest.param(5e-3, marks=pytest.mark.slow)])
 def test_a_thousand_jogs_arrive_where_the_last_was_to_end(latency: float) -> None:
     with standing_machine(latency) as (stage, controller):

@@ -170,6 +170,7 @@ def test_a_sensor_is_not_blamed_while_the_thread_that_reads_it_is_held_up() -> N
         assert sensor.held_up == ""
 
 
+@pytest.mark.slow
 def test_a_thread_that_never_reads_again_is_not_waited_for_for_ever() -> None:
     sensor, master = on_a_port()
     with Sending(master), sensor:

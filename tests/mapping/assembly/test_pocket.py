@@ -79,6 +79,7 @@ def test_a_pocket_beside_another_is_no_part_of_it():
         assert abs(feature.length.median - 2.0 * HALF[0]) < 0.15e-3
 
 
+@pytest.mark.slow
 def test_a_bar_across_three_rows_runs_across_them():
     half, high, tip = 1e-3, 0.4e-3, 3e-3
     x = np.arange(0.0, 40e-3, 0.1e-3)

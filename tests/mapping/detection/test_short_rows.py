@@ -52,6 +52,7 @@ def test_a_wire_that_takes_most_of_every_row_is_no_noise(base):
     assert np.median(list(heights.values())) == pytest.approx(0.6e-3, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lines", [0.0, 1.0, 3.0, 10.0])
 def test_short_rows_that_stand_off_each_other_hold_nothing(lines):
     trace = rows(lambda x, y: 0.0 * x, seed=5, lines=lines)

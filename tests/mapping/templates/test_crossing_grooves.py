@@ -45,6 +45,7 @@ def alone(place: FloatArray, half: float, depth: float) -> float:
     return float(out[0, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [None, 0.1e-3])
 @pytest.mark.parametrize("count", [2, 3])
 def test_grooves_together_leave_what_trying_all_of_the_surface_says(count: int, depth: float | None) -> None:

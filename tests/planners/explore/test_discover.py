@@ -92,6 +92,7 @@ def test_impossible_boxes_and_sides_are_refused() -> None:
         Discover(low=np.ones(3), high=np.zeros(3), tip_radius=R, smallest=1e-4)
 
 
+@pytest.mark.slow
 def test_a_block_on_a_table_is_a_polyhedron_without_its_underside() -> None:
     import trimesh
 

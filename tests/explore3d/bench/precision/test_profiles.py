@@ -16,6 +16,7 @@ def test_what_is_on_a_profile_is_found(name: str) -> None:
         assert abs(feature.height.median) == pytest.approx(abs(height), rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["faint scratch", *(pytest.param(name, marks=pytest.mark.slow) for name in ("slot", "hump"))]
 )

@@ -52,6 +52,7 @@ def asked(trace: Trace) -> tuple[LaidTrace, Detections, Backlash | None]:
     return laid, found, backlash(laid, found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("back", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("play", [pytest.param(20e-6, marks=pytest.mark.slow), 40e-6])
 def test_a_play_is_told_and_heights_without_it_are_right(play: float, back: bool) -> None:
@@ -92,6 +93,7 @@ def ring() -> Base:
     return Base(Surface(corners, np.concatenate(sides)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("play", [0.0, 20e-6])
 def test_where_a_path_round_a_body_turns_an_axis_its_play_is_told_without_a_crest(play: float) -> None:
     rng, base = np.random.default_rng(7), ring()

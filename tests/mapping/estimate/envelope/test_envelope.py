@@ -165,6 +165,7 @@ def sphere(x, y):
     return np.sqrt(16 - x**2 - y**2) - 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bend", [0.0, 0.3])
 def test_sweeps_over_a_sphere_become_a_mesh_on_the_sphere(bend):
     trace = rows(sphere, bend=bend)
