@@ -17,7 +17,8 @@ from mapping.instrument import neighbour_scatter, robust_sd
 # The mesh of a fitted base goes on so many tip radii beyond the samples: a foot lies at most one aside of its centre,
 # on however steep a flank, and with the other no ball that touches there reaches over the border
 FIT_MARGIN = 2.0
-# Fitted families that are smooth all over: their facets stand for something rounder
+# Fitted families that are smooth all over: their facets stand for something rounder. Planes, polyhedra and extrusions
+# are as flat as they are drawn, or have edges; what is round of an extrusion is drawn to 3e-6 of its radius
 SMOOTH_FAMILIES = ("sphere", "cylinder", "quadric", "sheet", "tube", "star body")
 # Places of a surface closer together than this hang together, in tip radii. They lie 0.06 apart, and are rounded to
 # cells of half of this: links of up to 0.4 + 0.2 sqrt(3), less than half of the strip of 1.8 about the sweep that parts
@@ -214,7 +215,7 @@ class Base:
         normals = np.where(clear[:, None], away / safe, nearest.normals)
         height = signed - tip_radius - self.offset
         if self.kind in SMOOTH_FAMILIES:
-            lean = self.nearest.smooth_normals(nearest.face, nearest.barycentric) - normals
-            bulge = self.nearest.bulge(nearest.face, nearest.barycentric)
+            smooth, bulge = self.nearest.smooth_body(nearest.face, nearest.barycentric)
+            lean = smooth - normals
             height -= bulge + 0.5 * tip_radius * np.einsum("ij,ij->i", lean, lean)
         return Feet(nearest.points, normals, height, nearest.face, nearest.barycentric)

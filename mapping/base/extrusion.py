@@ -14,6 +14,10 @@ from mapping.base.quadrics import Cloud, Fitted, grid_faces, pieces_of
 from mapping.geometry.mesh import spline_design
 from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit
 
+# The numbers by which a section is sought decide little, tried with twelve bodies (fillets, edges, corners, gutters;
+# places, turns, radii and directions by chance, noise of 20 um): as they are the bends of all twelve are right, and 11
+# come within 4 um; with half, two thirds or twice of each, a third or three times the places of an arc, and slopes of
+# 72 or 87 degrees, 11 or 12 and 10 or 11: one body goes either way by the last digits. With 20 steps of a fit 9 do.
 # Bends of a section, at most: a gutter with a lip on either side has four
 MOST_ARCS = 4
 # Directions that the line is sought in, over half a turn, and straight pieces that the section is sought as: both only
@@ -27,7 +31,7 @@ ROUGHLY = 3
 BEGUN_ROUND = (0.1, 2.0)
 # Rounds of parting what the body explains from what stands off it, until no cell changes
 PARTED_ROUNDS = 6
-# Steps of one fit: those that lead to a fillet, an edge, a corner and a gutter take up to 20
+# Steps of one fit
 SECTION_STEPS = 40
 # Largest sine of a slope against the plane that most of the path lies in: 80 degrees
 STEEPEST_SINE = 0.985

@@ -8,6 +8,10 @@ import numpy as np
 
 from mapping import FloatArray, IntArray
 
+# An explanation is preferred if it makes the heights so much more probable: a thousand times
+LEAST_GAIN = float(np.log(1e3))
+# Less noise than this many tip radii is rounding
+ROUNDING = 1e-9
 # Correlated part of a block's noise in units of the white part, and its length in blocks: from none to offsets of
 # whole sweeps
 CORRELATED, CORRELATION_BLOCKS = (1.0, 3.0, 10.0, 30.0), (2.0, 8.0, 32.0, 128.0)

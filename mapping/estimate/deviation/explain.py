@@ -19,7 +19,7 @@ from mapping.estimate.deviation.blocks import (
     weighted_median,
 )
 from mapping.estimate.deviation.drift import Drift, SteadyDrift, drift
-from mapping.estimate.deviation.evidence import Fit, Whitened, best_fit, every_law, whitened
+from mapping.estimate.deviation.evidence import LEAST_GAIN, ROUNDING, Fit, Whitened, best_fit, every_law, whitened
 from mapping.estimate.deviation.facets import round_out
 from mapping.estimate.deviation.fields import RigidFrame, SmoothField, spread
 from mapping.estimate.deviation.on_details import unexplained
@@ -30,8 +30,6 @@ from mapping.instrument import MAD_TO_SD
 
 # Fewer blocks tell nothing
 FEWEST_BLOCKS = 24
-# Less noise than this many tip radii is rounding
-ROUNDING = 1e-9
 # Cells whose median heights say whether anything is wrong, in tip radii; a quantile of their squares, which a fine
 # feature in some cells does not move, with its value for unit white noise (of chi-square with one degree of freedom);
 # by how much noise that is correlated within a block may exceed that; and the variance of a median over that of a mean,
@@ -49,8 +47,6 @@ AMPLITUDES = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
 # Before anything is felt a model has each of the causes with this probability; and one that moves the surface by less
 # than this share of the whole is corrected, but not worth a word
 LIKELY_CAUSE, WORTH_NAMING = 0.1, 0.05
-# An explanation is preferred if it makes the heights so much more probable: a thousand times
-LEAST_GAIN = float(np.log(1e3))
 # Two explanations that differ by less cannot be told apart
 ALIKE_EVIDENCE = float(np.log(10.0))
 # Rounds: turns and displacements are linear in the small only

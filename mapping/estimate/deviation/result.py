@@ -58,7 +58,7 @@ class Deviation:
 
     Args:
         base: the model with all corrected that can be.
-        causes: of CAUSES, the one that moves the surface most first.
+        causes: of CAUSES; after facets, which are rounded out before, the one that moves the surface most first.
         instead: causes that would explain the heights as well as the first: the trace cannot tell them apart.
         shift: (3,) of the body's middle against its model, m.
         turn: angle by which it is turned, rad.

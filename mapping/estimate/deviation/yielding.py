@@ -17,8 +17,8 @@ import numpy as np
 from mapping import FloatArray, Trace, length_text
 from mapping.base import LaidTrace
 from mapping.estimate.deviation.blocks import Blocks
-from mapping.estimate.deviation.evidence import Whitened, best_fit, every_law, whitened
-from mapping.estimate.deviation.explain import EXPECTED_SHARE, FEWEST_BLOCKS, LEAST_GAIN, LIKELY_CAUSE
+from mapping.estimate.deviation.evidence import LEAST_GAIN, Whitened, best_fit, every_law, whitened
+from mapping.estimate.deviation.explain import EXPECTED_SHARE, FEWEST_BLOCKS, LIKELY_CAUSE
 from mapping.geometry.mesh import distances
 
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
         BoxedPoints as BoxedPoints,
         MovedNearestPoint as MovedNearestPoint,
         NearestPoint as NearestPoint,
+        side_bulges as side_bulges,
+        unit_vectors as unit_vectors,
     )
     from mapping.geometry.mesh.open3d_import import open3d as open3d
     from mapping.geometry.mesh.polyline import (
@@ -71,7 +73,7 @@ _PUBLIC = {
     "box_kernels": ("MOST_WAITING", "POINTS_PER_BOX", "boxes_about", "nearest_boxed", "nearest_from"),
     "bvh_kernels": ("STACK", "WIDTH", "push_lanes"),
     "clip": ("FELT_SIDE_COSINE", "asked_part", "clipped", "faces_side"),
-    "nearest": ("CREASE_ANGLE", "BoxedPoints", "MovedNearestPoint", "NearestPoint"),
+    "nearest": ("CREASE_ANGLE", "BoxedPoints", "MovedNearestPoint", "NearestPoint", "side_bulges", "unit_vectors"),
     "open3d_import": ("open3d",),
     "polyline": ("arclengths", "directions", "distances", "middle", "nearest_on", "resample"),
     "threads": ("NEAREST_COST", "algebra_in_one_thread", "by_shares", "cores"),

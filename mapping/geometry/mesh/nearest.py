@@ -107,7 +107,7 @@ class NearestPoint:
         _, name = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
         sums = np.zeros((int(name.max()) + 1, 3))
         np.add.at(sums, name.ravel(), np.repeat(self.surface.face_normals, 3, axis=0))
-        return _unit(sums)[name.ravel()].reshape(-1, 3, 3)
+        return unit_vectors(sums)[name.ravel()].reshape(-1, 3, 3)
 
     def smooth_normals(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
         """(N, 3) unit normals of the smooth body that facets stand for: linear between those of a face's corners.
@@ -121,26 +121,19 @@ class NearestPoint:
 
         Reference: Phong, Communications of the ACM 18, 1975.
         """
-        asked, row = np.unique(face, return_inverse=True)
-        corners = self.corner_normals(asked)[row.ravel()]
-        return _unit(np.einsum("nc,ncx->nx", barycentric, corners))
+        return self.smooth_body(face, barycentric)[0]
 
-    def bulge(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
-        """(N,) by which the smooth body that facets stand for lies over them, m; negative where it is hollow.
+    def smooth_body(self, face: IntArray, barycentric: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The same (N, 3), and (N,) by which that body lies over the facets, m; negative where it is hollow.
 
-        Along a side e from corner i to j whose normals are n_i and n_j a curve rises over its chord by
-        t (1 - t) (n_j - n_i) e / 2, and over the face their sum with t (1 - t) replaced by the product of both
-        coordinates is exact for a quadratic.
-
-        Args:
-            face: (N,) faces in which the places lie.
-            barycentric: (N, 3) their coordinates there.
+        Over a face the heights amid its sides (see `side_bulges`), each times four times the product of both
+        coordinates, come to that of a quadratic exactly.
         """
         asked, row = np.unique(face, return_inverse=True)
         normals, corners = self.corner_normals(asked), self.surface.vertices[self.surface.faces[asked]]
-        ahead = [1, 2, 0]
-        rise = 0.5 * np.einsum("fcx,fcx->fc", normals[:, ahead] - normals, corners[:, ahead] - corners)
-        return np.asarray(np.einsum("nc,nc->n", barycentric * barycentric[:, ahead], rise[row.ravel()]))
+        bulges = side_bulges(corners, normals)[row.ravel()]
+        over = 4.0 * np.einsum("nc,nc->n", barycentric * barycentric[:, [1, 2, 0]], bulges)
+        return unit_vectors(np.einsum("nc,ncx->nx", barycentric, normals[row.ravel()])), np.asarray(over)
 
     def corner_normals(self, face: IntArray) -> FloatArray:
         """(N, 3, 3) of each corner of some faces the mean normal of the faces about it that no crease parts from it.
@@ -161,7 +154,7 @@ class NearestPoint:
         alike = np.einsum("ij,ij->i", normals[other], normals[face[own // 3]]) > np.cos(CREASE_ANGLE)
         sums = np.zeros((len(vertices), 3))
         np.add.at(sums, own, np.where(alike, self._steepness.ravel()[beside], 0.0)[:, None] * normals[other])
-        return _unit(sums).reshape(-1, 3, 3)
+        return unit_vectors(sums).reshape(-1, 3, 3)
 
     @cached_property
     def _corners_at(self) -> tuple[IntArray, IntArray]:
@@ -183,7 +176,7 @@ class NearestPoint:
     def _angles(self) -> FloatArray:
         """(F, 3) angles of the faces at their corners, rad."""
         ends = self.surface.vertices[self.surface.faces]
-        u, v = (_unit(np.roll(ends, -k, axis=1) - ends) for k in (1, 2))
+        u, v = (unit_vectors(np.roll(ends, -k, axis=1) - ends) for k in (1, 2))
         return np.asarray(np.arccos(np.clip(np.einsum("fcx,fcx->fc", u, v), -1.0, 1.0)))
 
     @cached_property
@@ -192,7 +185,7 @@ class NearestPoint:
         faces, sums = self.surface.faces, np.zeros_like(self.surface.vertices)
         for corner in range(3):
             np.add.at(sums, faces[:, corner], self._angles[:, corner, None] * self.surface.face_normals)
-        return _unit(sums)
+        return unit_vectors(sums)
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,11 +211,23 @@ class MovedNearestPoint(NearestPoint):
     def edge_normals(self) -> FloatArray:
         return np.asarray(self.still.edge_normals @ self.rotation.T)
 
-    def smooth_normals(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
-        return np.asarray(self.still.smooth_normals(face, barycentric) @ self.rotation.T)
+    def smooth_body(self, face: IntArray, barycentric: FloatArray) -> tuple[FloatArray, FloatArray]:
+        normals, over = self.still.smooth_body(face, barycentric)
+        return np.asarray(normals @ self.rotation.T), over
 
-    def bulge(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
-        return self.still.bulge(face, barycentric)
+
+def side_bulges(corners: FloatArray, normals: FloatArray) -> FloatArray:
+    """(F, 3) height of a body over the middles of facets' sides, from each corner to the next, m; negative: below.
+
+    Along a side e from corner i to j with normals n_i and n_j a curve rises over its chord by
+    t (1 - t) (n_j - n_i) e / 2.
+
+    Args:
+        corners, normals: (F, 3, 3) of the facets, and of the body there.
+    """
+    ahead = [1, 2, 0]
+    turned, sides = normals[:, ahead] - normals, corners[:, ahead] - corners
+    return np.asarray(0.125 * np.einsum("fcx,fcx->fc", turned, sides))
 
 
 class BoxedPoints:
@@ -264,7 +269,7 @@ class BoxedPoints:
         return distance, number
 
 
-def _unit(vectors: FloatArray) -> FloatArray:
+def unit_vectors(vectors: FloatArray) -> FloatArray:
     """Rows scaled to length one; rows of no length stay zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
