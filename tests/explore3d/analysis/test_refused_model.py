@@ -12,6 +12,7 @@ from explore3d.jobs import analyze
 from explore3d.report.findings import summary
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("below", [1.0, 10.0])
 def test_a_model_too_low_is_told(tmp_path: Path, below: float) -> None:
     """A plate probed every 0.25 mm, with a rib across the rows; the model lies so many mm below it."""

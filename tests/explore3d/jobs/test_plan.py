@@ -297,6 +297,7 @@ def test_a_budget_that_ends_the_survey_is_said_first_with_what_it_would_take(tmp
     assert "take about 4 min 13 s at 30 mm/s" in plan.stopped and "the time budget is 20 s" in plan.stopped
 
 
+@pytest.mark.slow
 def test_of_many_moves_that_break_a_limit_some_are_told(tmp_path: Path) -> None:
     plan = planned(tmp_path, TEXT.replace('time_budget = "10 min"', 'time_budget = "20 s"'))
     many = replace(plan, violations=tuple((number, "too far") for number in range(1, 15)))

@@ -36,6 +36,7 @@ def stroke(*corners: tuple[float, float]) -> FloatArray:
     return np.column_stack([np.interp(even, s, line[:, 0]), np.interp(even, s, line[:, 1])])
 
 
+@pytest.mark.slow
 def test_a_ring_that_rows_run_beside_is_one_closed_ridge_not_a_wide_one() -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, 900)
     trace = felt([7e-3 * np.column_stack([np.cos(turn), np.sin(turn)]) + [0.5e-3, 0.9e-3]])

@@ -76,6 +76,7 @@ def missed(base: Base, lines: list[FloatArray]) -> FloatArray:
     return np.abs(base.foot(np.concatenate(lines), TIP).height)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lines", "kind"), [pytest.param(egg(), "star body", marks=pytest.mark.slow), (vase(), "tube")]
 )

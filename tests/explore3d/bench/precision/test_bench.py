@@ -74,6 +74,7 @@ def test_a_bench_of_which_a_stage_fails_ends_with_1(tmp_path: Path, monkeypatch:
         assert explore3d_main(monkeypatch, "bench", "--out", tmp_path / "bench") == status
 
 
+@pytest.mark.slow
 def test_default_moves_sample_what_ours_settled_on():
     """The likeliest section may be another than the one that is posed first, and has other parameters."""
     trace, base, feature = crossings(2)

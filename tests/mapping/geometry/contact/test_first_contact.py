@@ -208,6 +208,7 @@ def test_a_ball_that_starts_overlapping_says_so() -> None:
     assert np.isnan(contacts.centers[0]).all()
 
 
+@pytest.mark.slow
 def test_a_resting_ball_is_held_when_pressed_and_free_to_leave_or_roll() -> None:
     ball = BallContact(box(), 0.5)
     rest = ball.first_contact(above(50) * [1, 1, 3], DOWN).centers
