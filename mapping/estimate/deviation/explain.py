@@ -118,7 +118,7 @@ def explain(
     given, blocks = base, Blocks.of(LaidTrace.of(trace, base), metres)
     if len(blocks) < FEWEST_BLOCKS:
         return None
-    tip, rounded = trace.tip_radius, round_out(trace, base)
+    tip, rounded, drawn, over_drawn = trace.tip_radius, round_out(trace, base), base, blocks
     if rounded is not None:
         given = base = rounded.base
         blocks = Blocks.of(LaidTrace.of(trace, base), metres)
@@ -161,8 +161,15 @@ def explain(
         parts = parts_of(seen, seen.height, seen.smooth_as_felt, tip, missed)
     deviation = _deviation(before, now, blocks, seen, found, lines, parts, tip)
     if rounded is not None:
-        causes, gain = ("facets", *deviation.causes), deviation.gain or rounded.gain
-        deviation = replace(deviation, causes=causes, facets=rounded.bulge, gain=gain)
+        over = drawn.nearest.query(before.surface.vertices)
+        deviation = replace(
+            deviation,
+            causes=("facets", *deviation.causes),
+            facets=rounded.bulge,
+            gain=deviation.gain or rounded.gain,
+            heights=deviation.heights + over.side * over.distance,
+            rms=_usual_height(over_drawn),
+        )
     elif not found and not lines and not parts and not level and not deviation.beyond_repair:
         return None
     if not level:
@@ -553,7 +560,6 @@ def _deviation(
         shift, turn = there - middle, Pose.angle(new.rotation @ back.T)
     bends = [step for step in found if step.field is not None]
     bent = sum(step.field.columns(blocks.points, blocks.normals) @ step.smooth for step in bends if step.field)
-    smooth = blocks.smooth_as_felt
     return Deviation(
         base=now,
         causes=tuple(named),
@@ -566,13 +572,18 @@ def _deviation(
         length=bends[0].field.length if bends and bends[0].field else 0.0,
         lines=tuple(lines),
         parts=parts,
-        rms=MAD_TO_SD * float(np.median(np.abs(blocks.height[smooth]))),
+        rms=_usual_height(blocks),
         left=MAD_TO_SD * float(np.median(np.abs(seen.height[keep]))),
         gain=(*(step.gain for step in found), *(own.gain for own in lines if isinstance(own, Drift)), 0.0)[0],
         heights=heights,
         unexplained=left_over,
         beyond_repair=left_over > BEYOND_REPAIR,
     )
+
+
+def _usual_height(blocks: Blocks) -> float:
+    """Of the blocks where a smooth surface joins them, by their median, m."""
+    return MAD_TO_SD * float(np.median(np.abs(blocks.height[blocks.smooth_as_felt])))
 
 
 def _vertex_normals(base: Base) -> FloatArray:

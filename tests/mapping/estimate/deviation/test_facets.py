@@ -47,6 +47,11 @@ def test_flats_of_a_round_shaft_are_rounded_out(sides: int) -> None:
     assert found is not None and found.causes == ("facets",)
     assert found.facets == pytest.approx(bulge, rel=0.05)
     assert "stand for a round body" in found.sentence()
+    # drawn as the map of the deviation, and told as what was typical before and is left
+    assert found.heights.max() == pytest.approx(bulge, rel=0.05) and found.heights.min() > -0.01 * bulge
+    assert len(found.heights) == len(found.base.surface.vertices)
+    if bulge > 10.0 * NOISE:
+        assert found.rms > 0.3 * bulge > 10.0 * found.left
     left = found.base.foot(trace.centers, TIP).height
     assert left.std() < 1.05 * NOISE and abs(left.mean()) < 0.2 * NOISE
     assert not found.base.surface.open_sides.any(), "no gap opens"
