@@ -40,6 +40,8 @@ MOST_LEVELS = 8
 # likely to scatter about it as to lie anywhere there: 2 log(2 FEATURE_RESIDUAL_SDS / sqrt(2 pi)). Of a level it is 1,
 # of a crest or a flank that passes through the height 3 and more
 PASSING_SQUARE = 2.0 * float(np.log(2.0 * FEATURE_RESIDUAL_SDS / np.sqrt(2.0 * np.pi)))
+# Relative change of a standard deviation that a window of three to either side does not show: it cuts 1.3 % off it
+SCATTER_TOLD = 0.02
 # Rounds until no cell changes its level: of 108 fits to noisy rasters over steps, stairs and slopes 103 took no more
 # than five; after six the last levels stand
 LEVEL_ROUNDS = 6
@@ -77,8 +79,9 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
     The field's slopes come from differences of heights of cells that lie apart, of which most stand on one level. A
     level counts if the cells on it gain more than its height and the places of its edges cost. The field of the level
     with the most cells is the base; the others are what detection finds as steps.
-    Cells on a level may differ by what the cells of such pairs do, and as many count as are independent then: roughness
-    and drift are no levels, however smooth from cell to cell.
+    Cells on a level may differ by what the cells of such pairs do, or by more where a level holds more (drift goes on
+    beyond the pairs' distance), and as many count as are independent then: roughness and drift are no levels, however
+    smooth from cell to cell.
     """
     x, y, z = cloud.points.T
     columns = design(x, y)
@@ -89,16 +92,15 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
     # what differences cannot tell, the constant, comes out as zero: the levels hold it
     slopes = robust_fit(columns[one] - columns[other], z[one] - z[other], np.sqrt(2.0) * cloud.scale).coefficients
     rest = z - columns @ slopes
-    scale = max(cloud.floor, robust_scale(rest[one] - rest[other]) / np.sqrt(2.0))
-    share = independent_share(1.0 - (cloud.floor / scale) ** 2)
-    levels = _levels(rest, cloud.sweep, scale, share)
+    paired = max(cloud.floor, robust_scale(rest[one] - rest[other]) / np.sqrt(2.0))
+    levels = _levels(rest, cloud, paired)
     for _ in range(LEVEL_ROUNDS):
         if len(levels.heights) < 2:
             return None
         on = np.maximum(levels.level, 0)
         fit = robust_fit(columns, z - levels.heights[on], cloud.scale)
         before, rest = levels, z - columns @ fit.coefficients
-        levels = _levels(rest, cloud.sweep, scale, share)
+        levels = _levels(rest, cloud, paired)
         if np.array_equal(before.level, levels.level):
             break
     if len(levels.heights) < 2:
@@ -139,8 +141,16 @@ def _pairs(cloud: Cloud) -> tuple[IntArray, IntArray] | None:
     return np.concatenate(one), np.concatenate(other)
 
 
-def _levels(rest: FloatArray, sweep: IntArray, scale: float, share: float) -> _Levels:
-    """Levels of what is left (C,) of the heights of sweeps, the one with the most cells first, as long as each pays."""
+def _levels(rest: FloatArray, cloud: Cloud, paired: float) -> _Levels:
+    """Levels of what is left (C,) of the heights, the one with the most cells first, as long as each pays.
+
+    Args:
+        rest: heights without the field's slopes, m.
+        cloud: the cells.
+        paired: standard deviation of cells that lie apart, m.
+    """
+    sweep, scale = cloud.sweep, _scatter(rest, paired)
+    share = independent_share(1.0 - (cloud.floor / scale) ** 2)
     reach = FEATURE_RESIDUAL_SDS * scale
     heights: list[float] = []
     level = np.full(len(rest), -1, dtype=np.int64)
@@ -158,6 +168,21 @@ def _levels(rest: FloatArray, sweep: IntArray, scale: float, share: float) -> _L
         heights.append(height)
         level = new
     return _Levels(np.array(heights) - heights[0], level, sweep)
+
+
+def _scatter(rest: FloatArray, paired: float) -> float:
+    """Standard deviation of cells on one level, m: the least from `paired` on that its fullest level agrees with.
+
+    What lies evenly about a height, as a slope's cells do, scatters by more than any that is tried, up to all there is:
+    it makes one level.
+    """
+    ordered, scale, told = np.sort(rest), 0.0, paired
+    while told > (1.0 + SCATTER_TOLD) * scale:
+        scale = told
+        height = _densest(ordered, FEATURE_RESIDUAL_SDS * scale)
+        near = ordered[np.abs(ordered - height) < FEATURE_RESIDUAL_SDS * scale]
+        told = max(scale, float(np.sqrt(((near - height) ** 2).mean())))
+    return told
 
 
 def _densest(ordered: FloatArray, reach: float) -> float:

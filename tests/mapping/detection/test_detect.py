@@ -276,7 +276,8 @@ def test_rounding_of_the_positions_is_no_feature_but_a_wire_beneath_it_is() -> N
         return Trace(trace.t, centers, trace.sweep, TIP, resolution=step)
 
     flat = rounded(lambda x: 0.0 * x)
-    assert detect(replace(flat, resolution=0.0), plate()).crossings
+    unsaid = detect(replace(flat, resolution=0.0), plate())
+    assert not unsaid.crossings and unsaid.remarks and unsaid.detection_limit > step
     silent = detect(flat, plate())
     assert not silent.crossings and "rounding" in silent.left_out[-1]
     assert silent.detection_limit >= step
