@@ -43,6 +43,7 @@ class Cloud:
         outward: (C, 3) measured contact normals in the frame, or None.
         sweep: (C,) of each point.
         inside: whether a round body was felt from inside, where that is known; else None.
+        reach: farthest that a sample lies from the cell it was taken into, m.
     """
 
     points: FloatArray
@@ -53,6 +54,7 @@ class Cloud:
     outward: FloatArray | None
     sweep: IntArray
     inside: bool | None = None
+    reach: float = 0.0
 
     @classmethod
     def of(cls, trace: Trace, most: int, inside: bool | None = None) -> Cloud:
@@ -68,9 +70,9 @@ class Cloud:
             axes = np.stack([axes[0], -axes[1], axes[2]])
         points = (means - origin) @ axes.T
         outward = None if normals is None else normals @ axes.T
-        return cls(
-            points, origin, axes, _roughness(points, cells.sweep), trace.tip_radius, outward, cells.sweep, inside
-        )
+        reach = float(np.linalg.norm(trace.centers - means[cells.cell], axis=1).max())
+        scatter = _roughness(points, cells.sweep)
+        return cls(points, origin, axes, scatter, trace.tip_radius, outward, cells.sweep, inside, reach)
 
     def world(self, points: FloatArray) -> FloatArray:
         """Points (N, 3) of the frame in the object frame."""
@@ -94,8 +96,8 @@ class Cloud:
 
     @property
     def margin(self) -> float:
-        """By which a base goes on beyond the points, m."""
-        return FIT_MARGIN * self.tip_radius
+        """By which a base goes on beyond the cells, m: that far beyond the samples of those at its border."""
+        return FIT_MARGIN * self.tip_radius + self.reach
 
     @property
     def extent(self) -> FloatArray:

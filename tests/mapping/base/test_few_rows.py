@@ -60,6 +60,14 @@ def test_a_step_across_rough_rows_parts_two_levels(rows: int) -> None:
     assert np.diff(parted)[0] == pytest.approx(6e-6, abs=0.3e-6)
 
 
+def test_a_base_goes_on_beyond_all_samples_of_long_sweeps_of_a_small_tip() -> None:
+    # 30,000 samples are 4000 cells: the outermost means lie two tip radii within the ends of the path
+    path = rows_over(np.zeros(10000), 3, 30e-6)
+    vertices = fit_base(path).surface.vertices[:, :2]
+    assert (vertices.min(axis=0) <= path.centers[:, :2].min(axis=0) - STYLUS).all()
+    assert (vertices.max(axis=0) >= path.centers[:, :2].max(axis=0) + STYLUS).all()
+
+
 @pytest.mark.slow
 def test_rough_rows_without_a_step_have_one_level() -> None:
     for rows in (2, 3, 16):
