@@ -493,9 +493,12 @@ def _merged(values: FloatArray, merge: int) -> FloatArray:
 
 
 def _window(profile: _Profile, which: int, left: FloatArray, noise: Noise) -> _Window | None:
-    """The window about a crest of a profile, by heights (N,) beside all crests; None if too little lies about it."""
+    """The window about a crest of a profile, by heights (N,) beside all crests; None if too little lies about it, or it
+    is cut off by the end of the sweep."""
     s, crest = profile.s, profile.crests[which]
     height, place, half_width = crest
+    if place - half_width < s[0] or place + half_width > s[-1]:
+        return None  # one flank alone: what it lacks of a crest is no play
     others = [at for at in profile.crests[:, 1] if at != place]
     low = max([place - WINDOW_HALF_WIDTHS * half_width, *(0.5 * (at + place) for at in others if at < place)])
     high = min([place + WINDOW_HALF_WIDTHS * half_width, *(0.5 * (at + place) for at in others if at > place)])
