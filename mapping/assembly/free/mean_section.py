@@ -73,6 +73,7 @@ def _of_mean(group: Sequence[FreeSection], square: FloatArray, tip: float, noise
     index, nowhere = np.arange(len(mean) + 1), np.zeros((len(mean), 3))
     start = float(u[known][0])
     piece = SweepHeights(first.sweep, start, spacing, mean, samples, index, np.zeros(len(mean)), nowhere)
+    single = noise.scaled(white=max(samples, 1.0) ** -0.5)
     noise = noise.of_passes(len(group)).scaled(white=(max(samples, 1.0) * len(group)) ** -0.5)
     while len(piece.height) >= LEAST_BINS:
         section = _middle_section(piece, group[0].sign, reach, noise.sd)
@@ -80,13 +81,24 @@ def _of_mean(group: Sequence[FreeSection], square: FloatArray, tip: float, noise
             sizes = sizes_of_section(section, tip, noise)
             if sizes is None or float(np.median([each.sizes.steep for each in group])) < BLURRED:
                 return sizes
-            own = [each.sizes.across(float(by)) for each, by in zip(group, square, strict=True)]
+            own = [_own_sizes(each, float(by), reach, tip, single) for each, by in zip(group, square, strict=True)]
             width, least, most = (float(np.mean([getattr(s, k) for s in own])) for k in ("width", "least", "most"))
             least_sd = float(np.mean([each.least_sd for each in own])) / np.sqrt(len(own))
             doubt = float(np.median([each.foot_doubt for each in own]))
             return replace(sizes, width=width, foot_doubt=doubt, least=least, most=most, least_sd=least_sd)
         piece, noise = piece.coarser(), noise.scaled(white=2.0**-0.5)
     return None
+
+
+def _own_sizes(section: FreeSection, square: float, reach: float, tip: float, noise: Noise) -> SectionSizes:
+    """The sizes of a sweep's own section, laid square to the line: along a sweep at a slant the ball's arcs are drawn
+    out as well, and the sizes along it are not as many times too large as the width is."""
+    piece = section.piece
+    start = square * float(piece.s[0] - section.sizes.middle)
+    laid = replace(piece, start=start, spacing=square * piece.spacing)
+    found = _middle_section(laid, section.sign, reach, noise.sd)
+    sizes = None if found is None else sizes_of_section(found, tip, noise)
+    return section.sizes.across(square) if sizes is None else sizes
 
 
 def _laid_square(u: FloatArray, section: FreeSection, square: float) -> FloatArray:
