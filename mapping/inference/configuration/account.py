@@ -12,7 +12,7 @@ from mapping import Feature, MappingError, Posterior, Support
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference import describe
-from mapping.inference.configuration.configuration import Configuration, Part, as_bar, fitted, part_of
+from mapping.inference.configuration.configuration import Configuration, Part, as_bar, fitted, on_its_floor, part_of
 from mapping.inference.configuration.neighbourhood import (
     NEIGHBOURHOOD_REACH,
     PARTS_OF_BIN,
@@ -175,9 +175,10 @@ def _lay(
     except MappingError:  # a feature over whose axis the base does not go on has no family here
         features = [_posable(feature, place) for feature in block.features]
         try:
-            block.laid, block.features = _laid_out(features, place), features
+            block.laid = _laid_out(features, place)
         except MappingError:
             return
+    block.features = [part.feature for part in block.laid[0]]
 
 
 def _laid_out(features: Sequence[Feature], place: Neighbourhood) -> tuple[list[Part], Configuration]:
@@ -240,7 +241,7 @@ def _explains(best: Configuration, spot: Feature) -> bool:
 
 def _begun(feature: Feature, place: Neighbourhood) -> Part:
     """The part of a feature, in the family that it was proposed in."""
-    part, top = part_of(feature, place), feature.details.top
+    part, top = on_its_floor(part_of(feature, place), place), feature.details.top
     return as_bar(part, place, top) if top and isinstance(part.shape, RidgeShape) else part
 
 

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from mapping import Feature, FloatArray
+from mapping import Feature, FloatArray, Interval
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import crest_trace
 from mapping.inference.configuration.common_deviation import Deviation, Fitted, common_deviation
-from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood
+from mapping.inference.configuration.neighbourhood import NEIGHBOURHOOD_REACH, PARTS_OF_BIN, Neighbourhood
 from mapping.inference.curves import HIGHEST_DEGREE
 from mapping.inference.families import (
+    GrooveShape,
     RidgeShape,
     StepShape,
     TwinShape,
@@ -46,6 +47,9 @@ PLACE_OPEN = 1.5
 NO_HEIGHT = 1e-12
 # The level of misfit is chosen again where the optimum under the first one says another
 MOST_LEVEL_CHANGES = 3
+# Half-widths beside the axis of a groove within which the ball is about as deep as on it: where it hangs between two
+# rims it is 1 - (1 - 0.25)^2 = 0.44 of the depth higher at the border of that, a fifth in the median
+ON_AXIS = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,6 +206,42 @@ def part_of(feature: Feature, place: Neighbourhood, most: int = HIGHEST_DEGREE, 
         raise TypeError(f"a {feature.kind} has no family of shapes")
     spot = kind.shape_on(place.fine, feature, place.around)
     return Part(feature, spot, spot.start)
+
+
+def about(height: float) -> Interval:
+    """What a height (m) is taken to be that is only proposed: within a fifth of it."""
+    low, high = sorted((0.8 * height, 1.2 * height))
+    return Interval(height, low, high)
+
+
+def on_its_floor(part: Part, place: Neighbourhood) -> Part:
+    """An upright groove as deep and wide as one on whose floor the ball runs, if that is likelier to begin with.
+
+    From its depth alone a groove is taken to be as wide as a ball hangs in it that sinks so far. A wider one is never
+    found from there: while the ball hangs the path says nothing of the depth. Half as deep as on its axis the ball is
+    sqrt(r H - H^2 / 4) inside a rim (paper equation 4).
+    """
+    groove, feature, tip = part.shape, part.feature, place.around.trace.tip_radius
+    if type(groove) is not GrooveShape:
+        return part
+    window, sizes = place.window, sizes_of(feature, tip)
+    s, lateral, _ = groove.chart.coordinates(window.feet)
+    aside = np.abs(lateral - groove.modes.lateral(part.start[None, : groove.modes.count], s)[0])
+    near = (aside < NEIGHBOURHOOD_REACH * sizes.half_width) & (s > groove.chart.s[0]) & (s < groove.chart.s[-1])
+    middle = near & (aside < ON_AXIS * sizes.half_width)
+    depth = -float(np.median(window.height[middle])) if middle.any() else 0.0
+    if not 0.0 < depth < 2.0 * tip:
+        return part
+    deep = near & (window.height < -0.5 * depth)
+    width = 2.0 * (float(aside[deep].max(initial=0.0)) + float(np.sqrt(tip * depth - 0.25 * depth**2)))
+    felt = replace(feature, height=about(-depth), width=Interval(width, 0.5 * width, 2.0 * width))
+    wide = part_of(felt, place)
+    wide = replace(wide, start=np.array([*wide.start[:-2], np.log(width), np.log(depth)]))
+    log = [
+        float(LogPosterior(place.joined([each.shape]), place.levels[-1][0]).log_density(each.start[None])[0])
+        for each in (part, wide)
+    ]
+    return wide if log[1] > log[0] else part
 
 
 def as_bar(part: Part, place: Neighbourhood, top: float) -> Part:

@@ -17,6 +17,7 @@ from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.inference.configuration.configuration import (
     Configuration,
     Part,
+    about,
     as_bar,
     as_bell,
     as_smooth,
@@ -131,10 +132,15 @@ def joined(now: Configuration) -> Iterator[Parts]:
                     yield [*rest, _alike(like, short, now.place)]
         if min(len(line) for line in lines) < 2:
             continue
-        if not _faces(first, second, now.place):
+        # the top between two edges may be wider than what each of them disturbs, where a crest's flanks meet
+        edges = kind_of(first.feature).sided and kind_of(second.feature).sided
+        if not _faces(first, second, now.place, NEIGHBOURHOOD_REACH if edges else 1.0):
             continue
         across = nearest_on(lines[0], lines[1])[0] - lines[0]
         middle, width = lines[0] + 0.5 * across, float(np.median(np.linalg.norm(across, axis=1)))
+        if edges:
+            felt = np.concatenate([axis_of(as_far_as_felt(part, now.place)) for part in (first, second)])
+            middle = _beyond(felt, middle, sizes_of(first.feature, now.place.around.trace.tip_radius).half_width)
         height = 0.5 * (abs(first.feature.height.median) + abs(second.feature.height.median))
         for crossings in ("convex", "concave"):
             kind = kind_made_of(crossings, line=True)
@@ -534,6 +540,17 @@ def as_far_as_felt(part: Part, place: Neighbourhood) -> Part:
     return _line(part.feature, np.vstack([*first, axis, *([axis[0] + high * way] if after else [])]), place)
 
 
+def _beyond(felt: FloatArray, middle: FloatArray, reach: float) -> FloatArray:
+    """A polyline (K, 3) gone on straight past the last of the places (M, 3) where its edges, which have no ends, were
+    felt, so far (m) that no sweep would feel an end there."""
+    longer = middle.copy()
+    for end, before in ((0, 1), (-1, -2)):
+        way = middle[end] - middle[before]
+        way /= max(float(np.linalg.norm(way)), np.finfo(float).tiny)
+        longer[end] += (max(float(((felt - middle[end]) @ way).max()), 0.0) + reach) * way
+    return longer
+
+
 def _faces(first: Part, second: Part, place: Neighbourhood, share: float = 1.0) -> bool:
     """True if two lines run beside each other, nearer than both of their disturbances reach, or this share of it."""
     tip = place.around.trace.tip_radius
@@ -590,16 +607,14 @@ def _plainly(feature: Feature) -> Feature:
 
 def _sized(like: Feature, kind: str, height: float, width: float) -> Feature:
     details = replace(like.details, radius=None, top=None, run=None, high_side=None, misfit=None)
-    low, high = sorted((0.8 * height, 1.2 * height))
-    size = Interval(height, low, high)
-    return replace(like, kind=kind, height=size, width=Interval(width, 0.5 * width, 2.0 * width), details=details)
+    return replace(
+        like, kind=kind, height=about(height), width=Interval(width, 0.5 * width, 2.0 * width), details=details
+    )
 
 
 def _model(place: Neighbourhood, point: FloatArray, normal: FloatArray, height: float) -> Feature:
     """A feature of a height about a place, of which nothing else is known."""
     kind = kind_made_of("convex" if height > 0.0 else "concave", line=False)
-    low, high = sorted((0.8 * height, 1.2 * height))
-    size = Interval(height, low, high)
     width = abs(height) if height > 0.0 else 2.0 * float(np.sqrt(2.0 * place.around.trace.tip_radius * -height))
-    return Feature(kind.name, point[None], normal[None], size, Interval(width, 0.5 * width, 2.0 * width),
+    return Feature(kind.name, point[None], normal[None], about(height), Interval(width, 0.5 * width, 2.0 * width),
                    Interval(0.0, 0.0, 0.0), Support(0.0, 2), True, 0.1 * place.half_width)  # fmt: skip
