@@ -19,6 +19,7 @@ from planners.explore.found import Found
 from planners.explore.surveyor import CANDIDATES, SurveyCount, Surveyor
 from planners.explore.warm_up import get_ready
 from planners.follow import (
+    AxisEnd,
     AxisTrack,
     BumpSize,
     BumpSizer,
@@ -36,8 +37,6 @@ from planners.follow import (
 from planners.paths import Strokes
 from planners.survey import Survey
 
-# Slides off one end, at most; and so many in a row that do not show it say that no more will
-MOST_SLIDES, VAIN_SLIDES = 150, 8
 # Why a detection is passed over (see Found.passed_over)
 LOWER = "lower than the smallest feature asked for and hardly above the noise"
 
@@ -58,7 +57,7 @@ class Explore:
 
     After the survey the next action is always the one with the largest expected reduction of the features'
     uncertainty per second of finger time: looking into a detection (its extent is unknown by about a survey
-    pitch) or one more slide off an end that is not precise enough. It stops when nothing is left to gain.
+    pitch) or sharpening an end that is not precise enough. It stops when nothing is left to gain.
 
     Args:
         base: the global model.
@@ -249,20 +248,23 @@ class Explore:
             actions.append(Action("follow a faint line", self.survey.pitch, seconds, start))
         for index, track in enumerate(found.tracks):
             for which, end in enumerate(track.ends):
-                done = found.slides.get((index, which), 0)
-                if end.reason == "end" and end.sd > self._enough(track) and done < MOST_SLIDES and not track.step:
-                    seconds = 1.65 * track.half_width / self.speed
-                    # n slides leave 1 / sqrt(n) of the uncertainty of one
-                    left = float(np.sqrt((done + 1.0) / (done + 2.0)))
-                    gain = end.sd * (1.0 - left) if np.isfinite(end.sd) else self.survey.pitch
-                    start = partial(self._slide, index, which, found)
-                    actions.append(Action("slide off an end", gain, seconds, start))
+                if (index, which) in found.sharpened or not self._is_doubtful(end, track):
+                    continue
+                seconds = 4.0 * track.half_width / self.speed
+                gain = end.sd if np.isfinite(end.sd) else self.survey.pitch
+                actions.append(Action("sharpen an end", gain, seconds, partial(self._sharpen, index, which, found)))
         return actions
 
-    def _enough(self, track: AxisTrack) -> float:
-        """Standard deviation down to which slides are worth it, m: what they cannot tell is left beside it."""
+    def _is_doubtful(self, end: AxisEnd, track: AxisTrack) -> bool:
+        """True if sweeps across a line about its end are worth it."""
+        along, across = self._enough(track)
+        return end.reason == "end" and not track.step and (end.sd > along or end.across_sd > across)
+
+    def _enough(self, track: AxisTrack) -> tuple[float, float]:
+        """Standard deviations of an end along and across its line down to which sweeps are worth it, m: what they
+        cannot tell is left beside it."""
         unknown = Crest.of(track).rounding_sd(self.tip_radius)
-        return float(np.sqrt(max(self.wanted_sd**2 - unknown**2, unknown**2)))
+        return float(np.sqrt(max(self.wanted_sd**2 - unknown**2, unknown**2))), self.wanted_sd
 
     def _circuit_radius(self, seed: Crossing) -> float:
         """Wide enough to go round a bump whose top lies up to half a survey pitch beside the sweep."""
@@ -343,19 +345,14 @@ class Explore:
         noise = found.noise or Noise(0.0)
         return RidgeFollower(self.strokes, sense, noise, self.wanted_sd, known=_known(found))
 
-    def _slide(self, index: int, which: int, found: Found) -> Plan:
-        """Sweeps to and fro off an end until it is known well enough; the way to it is paid once for all."""
+    def _sharpen(self, index: int, which: int, found: Found) -> Plan:
+        """Sweeps across a line about its end until that is known well enough; the way to it is paid once for all."""
+        found.sharpened.add((index, which))
         track = found.tracks[index]
         finder = EndFinder(self.strokes, self.base, found.noise or Noise(0.0))
-        crest = Crest.of(track)
-        end, done, vain = track.ends[which], found.slides.get((index, which), 0), 0
-        while end.reason == "end" and end.sd > self._enough(track) and done < MOST_SLIDES:
-            slid = yield from finder.slide(end, crest)
-            vain = vain + 1 if slid is end else 0
-            end, done = slid, MOST_SLIDES if vain == VAIN_SLIDES else done + 1
-        found.slides[index, which] = done
+        end = yield from finder.sharpen(track.ends[which], Crest.of(track), self._enough(track))
         found.tracks[index] = track.with_end(which, end)
-        return Outcome(end.reason, f"end known to {length_text(end.sd)}")
+        return Outcome(end.reason, f"end known to {length_text(end.sd)} along, {length_text(end.across_sd)} across")
 
 
 def _known(found: Found) -> Callable[[FloatArray], bool]:

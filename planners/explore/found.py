@@ -36,7 +36,7 @@ class Found:
     crossings: list[Crossing] = field(default_factory=list)
     leads: list[FaintLead] = field(default_factory=list)
     tried: list[Crossing] = field(default_factory=list)
-    slides: dict[tuple[int, int], int] = field(default_factory=dict)
+    sharpened: set[tuple[int, int]] = field(default_factory=set)
     actions: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
     unseen: list[str] = field(default_factory=list)

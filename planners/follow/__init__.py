@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from planners.follow.axis_track import AxisTrack as AxisTrack
+    from planners.follow.axis_track import AxisEnd as AxisEnd, AxisTrack as AxisTrack
     from planners.follow.bump import BumpSize as BumpSize, BumpSizer as BumpSizer
     from planners.follow.circuit import Circuit as Circuit, headings as headings
     from planners.follow.end_finder import Crest as Crest, EndFinder as EndFinder
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from planners.follow.sense import Sense as Sense
 
 _PUBLIC = {
-    "axis_track": ("AxisTrack",),
+    "axis_track": ("AxisEnd", "AxisTrack"),
     "bump": ("BumpSize", "BumpSizer"),
     "circuit": ("Circuit", "headings"),
     "end_finder": ("Crest", "EndFinder"),

@@ -34,12 +34,11 @@ class AxisEnd:
 
     Args:
         point: (3,) on the base, m.
-        sd: standard deviation along the axis, m; infinite if unknown.
+        sd, across_sd: standard deviations along the axis and across it, m; infinite if unknown.
         reason: "end", "edge of the model", "joins another", "closed", "lost".
         heading: (3,) direction that points off the end.
         reach: how far beyond `point` the axis was found to be gone, m.
         turn: geodesic curvature of the axis there, towards the end, 1/m.
-        felt: what the sweeps off it felt.
     """
 
     point: FloatArray
@@ -48,7 +47,7 @@ class AxisEnd:
     heading: FloatArray
     reach: float = 0.0
     turn: float = 0.0
-    felt: Slides | None = None
+    across_sd: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Ridge end: sweeps along the crest and off its end, all fitted together."""
+"""Ridge end: a sweep along the crest and off its end finds it, sweeps across the line about it sharpen it."""
 
 from __future__ import annotations
 
@@ -12,14 +12,17 @@ from mapping import FloatArray, Trace
 from mapping.base import Base
 from mapping.instrument import Noise
 from planners.follow.axis_track import AxisEnd, AxisTrack, Slides
+from planners.follow.end_place import UNKNOWN_TURN, EndPlace, EndSection
 from planners.follow.recross import flattening
 from planners.follow.template_fit import FEWEST_FITTED, ShapeFit, end_shape, fit_shape
 from planners.paths import Strokes, tangential, to_and_fro
 
-# A slide in half-widths of the disturbance: from so far before the end to so far beyond it. The first one must find
-# the end; the others pass only over what its place changes, the fall of the crest
-FIRST = (1.2, 1.8)
-NEXT = (0.4, 1.25)
+# A slide in half-widths of the disturbance: from so far before the end to so far beyond it
+SLIDE = (1.2, 1.8)
+# Sweeps across a line about its end: passes between two looks at what they tell, to and fro; and at most
+PASSES, MOST_PASSES = 2, 150
+# Samples' spacing that they are chosen by, in half-widths
+SAMPLES_APART = 0.01
 # A round end against a square one, in a / (r + a) half-widths: two traces that differ by less than a hundredth of the
 # height; and the standard deviation of a rounding of which nothing is known (mapping.inference.families.ridge)
 ROUNDED, UNKNOWN_ROUNDING_SD = 0.4, 0.35
@@ -53,13 +56,13 @@ class Crest:
 
 @dataclass(frozen=True, eq=False)
 class EndFinder:
-    """Slides off the ends of ridges and grooves.
+    """Finds the ends of ridges and grooves by slides off them, and sharpens them by sweeps across.
 
     Args:
         strokes: how to touch.
         base: the global model.
         noise: of the samples.
-        passes: sweeps of the first slide, which must find the end: a single one does not show a faint line.
+        passes: of a slide: a single one does not show a faint line.
     """
 
     strokes: Strokes
@@ -68,69 +71,133 @@ class EndFinder:
     passes: int = 1
 
     def slide(self, end: AxisEnd, crest: Crest) -> Generator[Move, Trace, AxisEnd]:
-        """A better estimate of an end from one more sweep along the crest; the old one if that shows nothing."""
-        tip = self.strokes.tip_radius
-        # a groove is crossed no more where its end lifts the ball, that far before the end
-        half = max(crest.half_width, float(np.sqrt(2.0 * tip * crest.height)))
-        back = self.strokes.walk(end.point, -end.heading, FIRST[0] * half, -end.turn)
-        ahead = self.strokes.walk(end.point, end.heading, end.reach + FIRST[1] * half, end.turn)
-        points = np.concatenate([back.points[:0:-1], ahead.points])
-        normals = np.concatenate([back.normals[:0:-1], ahead.normals])
-        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-        here = float(along[len(back.points) - 1])
-        swept = slice(None) if end.felt is None else self._swept(along - here, half, crest.sign)
-        turn = 1 if end.felt is None or end.felt.count % 2 == 0 else -1
-        move = self.strokes.over(points[swept][::turn], normals[swept][::turn])
-        traces = yield from to_and_fro(move, self.passes if end.felt is None else 1)
-        felt = end.felt
-        for trace in traces:
+        """The place of an end along the crest by a sweep along it; the end as it was if that feels nothing."""
+        tip, half = self.strokes.tip_radius, self._half(crest)
+        about = _Course.about(self.strokes, end, SLIDE[0] * half, end.reach + SLIDE[1] * half)
+        felt: Slides | None = None
+        for trace in (yield from to_and_fro(self.strokes.over(about.points, about.normals), self.passes)):
             feet = self.base.foot(trace.centers, tip)
             felt = Slides.joined(felt, feet.points, feet.height)
-        if felt is None or sum(len(trace) for trace in traces) < FEWEST_FITTED:
+        if felt is None or len(felt.heights) < FEWEST_FITTED:
             return end
-        fit = self._fitted(felt, points, normals, along, crest, float(along[-1]) - 0.5 * half)
-        inside = 0.02 * tip < fit.place < float(along[-1]) - 0.5 * half - 0.02 * tip
-        if not inside or fit.sd > 0.2 * tip or abs(fit.height) < 0.4 * crest.height:
-            return end if np.isfinite(end.sd) else replace(end, sd=max(end.reach, 0.1 * tip), reason="lost")
-        where, heading = _at(fit.place, along, points, normals)
-        # further slides start from the end: they must follow the same curve
+        last = float(about.along[-1]) - 0.5 * half
+        fit = self._fitted(felt, about, crest, last)
+        place = fit.place - float(about.along[0])
+        if not 0.02 * tip < place < last - 0.02 * tip or fit.sd > 0.2 * tip or abs(fit.height) < 0.4 * crest.height:
+            return replace(end, sd=max(end.reach, 0.1 * tip), reason="lost")
+        where, heading = about.at(fit.place)
+        # what follows starts from the end: it must follow the same curve
         onto = self.strokes.onto(where)[0]
-        return replace(end, point=onto, sd=fit.sd, reason="end", heading=heading, reach=0.0, felt=felt)
+        return replace(end, point=onto, sd=fit.sd, reason="end", heading=heading, reach=0.0)
 
-    def _swept(self, offset: FloatArray, half: float, sign: float) -> slice:
-        """The waypoints over the fall of the crest: beyond the end of a ridge, before that of a groove."""
-        before, beyond = NEXT if sign > 0 else NEXT[::-1]
-        inside = np.flatnonzero((offset >= -before * half) & (offset <= beyond * half))
-        return slice(inside[0], inside[-1] + 1) if len(inside) > 1 else slice(None)
+    def sharpen(self, end: AxisEnd, crest: Crest, wanted: tuple[float, float]) -> Generator[Move, Trace, AxisEnd]:
+        """The place of an end by sweeps to and fro across the line, each where it tells the most per second of what is
+        still wanted; the end as it was if they do not show it.
 
-    def _fitted(
-        self, felt: Slides, points: FloatArray, normals: FloatArray, along: FloatArray, crest: Crest, last: float
-    ) -> ShapeFit:
-        """The end's place on the line of points, from all slides laid over each other."""
-        place = places_along(felt.points, points, along)
+        Args:
+            wanted: standard deviations of the end's place along the line and across it, m.
+        """
+        half, enough = self._half(crest), np.array(wanted)
+        about = _Course.about(self.strokes, end, half, half)
+        place = EndPlace(
+            self._section(end, crest, half, about),
+            self.noise,
+            np.array([0.0, 0.0, 0.0, crest.height]),
+            np.array([end.sd, half, UNKNOWN_TURN, crest.height_sd]),
+        )
+        here, made, useless = 0.0, 0, set[float]()
+        while made < MOST_PASSES and place.fits and (place.sd[:2] > enough).any():
+            could = [each for each in place.sweeps(SAMPLES_APART * half) if about.holds(each.offset)]
+            could = [each for each in could if each.offset not in useless]
+            if not could:
+                break
+            seconds = [(abs(each.offset - here) + PASSES * 2.0 * each.half) / self.strokes.speed for each in could]
+            gains = [place.gain(each, PASSES, enough) for each in could]
+            sweep = could[int(np.argmax(np.divide(gains, seconds)))]
+            middle, heading = about.at(sweep.offset)
+            left = np.cross(self.strokes.onto(middle)[1], heading)
+            traces = yield from to_and_fro(self.strokes.line(middle, left, sweep.half, sweep.half), PASSES)
+            here, made = sweep.offset, made + PASSES
+            if sum(map(len, traces)) < FEWEST_FITTED:
+                useless.add(sweep.offset)
+                continue
+            for trace in traces:
+                feet = self.base.foot(trace.centers, self.strokes.tip_radius)
+                place.learn(sweep, (feet.points - middle) @ left, feet.height)
+            place.solve()
+        along, across, _, height = place.place
+        known = bool((place.sd[:2] <= enough).all())
+        if not (place.fits or known) or max(abs(along), abs(across)) > half or height < 0.4 * crest.height:
+            return end
+        where, heading = about.at(along)
+        point = self.strokes.onto(where + across * np.cross(self.strokes.onto(where)[1], heading))[0]
+        return replace(end, point=point, sd=float(place.sd[0]), across_sd=float(place.sd[1]), heading=heading)
+
+    def _section(self, end: AxisEnd, crest: Crest, half: float, about: _Course) -> EndSection:
+        """What the trace looks like about an end of a line with such a course."""
+        tip = self.strokes.tip_radius
+        left = np.cross(self.strokes.onto(end.point)[1], end.heading)
+        beside = _Course.about(self.strokes, replace(end, heading=left, turn=0.0), half, half)
+        # centres are |I + r II| apart: where the base is twisted, what is nearest to a place beside the line lies ahead
+        twist = float((about.normals[-1] - about.normals[0]) @ left / (about.along[-1] - about.along[0]))
+        wide = about.flattening(tip), beside.flattening(tip)
+        return EndSection(crest.sign, half, tip, wide, twist * tip / wide[0] ** 2)
+
+    def _half(self, crest: Crest) -> float:
+        """Half-width of the disturbance about an end, m: a groove is crossed no more where its end lifts the ball."""
+        return max(crest.half_width, float(np.sqrt(2.0 * self.strokes.tip_radius * crest.height)))
+
+    def _fitted(self, felt: Slides, about: _Course, crest: Crest, last: float) -> ShapeFit:
+        """The end's place on its course, from all slides laid over each other."""
+        place = places_along(felt.points, about.points, about.along)
         order = np.argsort(place, kind="stable")
         # the correlated part of the noise averages out over the slides, not along them
         noise = self.noise.of_passes(felt.count)
         shape = end_shape(crest.sign, self.strokes.tip_radius)
-        wide = flattening(along, normals, points[-1] - points[0], self.strokes.tip_radius)
+        wide = about.flattening(self.strokes.tip_radius)
         fit = fit_shape(
             wide * place[order],
             felt.heights[order],
             shape,
             crest.sign,
             crest.height,
-            (0.0, wide * last),
+            (wide * float(about.along[0]), wide * last),
             noise,
             crest_sd=crest.height_sd,
         )
         return replace(fit, place=fit.place / wide, sd=fit.sd / wide)
 
 
-def _at(place: float, along: FloatArray, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Point and heading (3,) at an arclength of a polyline."""
-    where = np.array([np.interp(place, along, points[:, k]) for k in range(3)])
-    k = int(np.clip(np.searchsorted(along, place), 1, len(points) - 1))
-    return where, tangential(points[k] - points[k - 1], normals[k])
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """The base along a line about its end: `points`, `normals` (K, 3), and `along` (K,) how far beyond the end, m."""
+
+    points: FloatArray
+    normals: FloatArray
+    along: FloatArray
+
+    @classmethod
+    def about(cls, strokes: Strokes, end: AxisEnd, before: float, beyond: float) -> _Course:
+        """From so far before the end to so far beyond it, m."""
+        back = strokes.walk(end.point, -end.heading, before, -end.turn)
+        ahead = strokes.walk(end.point, end.heading, beyond, end.turn)
+        points = np.concatenate([back.points[:0:-1], ahead.points])
+        normals = np.concatenate([back.normals[:0:-1], ahead.normals])
+        return cls(points, normals, np.concatenate([-back.along[:0:-1], ahead.along]))
+
+    def holds(self, place: float) -> bool:
+        """True if the base goes so far beyond the end, m."""
+        return bool(self.along[0] <= place <= self.along[-1])
+
+    def at(self, place: float) -> tuple[FloatArray, FloatArray]:
+        """Point and heading (3,) so far beyond the end, m."""
+        where = np.array([np.interp(place, self.along, self.points[:, k]) for k in range(3)])
+        k = int(np.clip(np.searchsorted(self.along, place), 1, len(self.points) - 1))
+        return where, tangential(self.points[k] - self.points[k - 1], self.normals[k])
+
+    def flattening(self, tip_radius: float) -> float:
+        """By how much shapes along it are narrower than on a flat base."""
+        return flattening(self.along, self.normals, self.points[-1] - self.points[0], tip_radius)
 
 
 def places_along(points: FloatArray, line: FloatArray, along: FloatArray) -> FloatArray:

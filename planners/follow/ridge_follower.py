@@ -218,7 +218,9 @@ class RidgeFollower:
         last = line.crossings[-1]
         gone += float(np.linalg.norm(farthest - last.point))
         ahead = course(line.points, last.normal, ahead.heading, self.strokes.tip_radius)
-        rough = AxisEnd(ahead.point, np.inf, "end", ahead.heading, gone, ahead.turn)
+        # as the ends of a straight line through crossings that lie evenly on it
+        beside = 2.0 * last.position_sd / float(np.sqrt(len(line.crossings)))
+        rough = AxisEnd(ahead.point, np.inf, "end", ahead.heading, gone, ahead.turn, across_sd=beside)
         finder = EndFinder(self.strokes, self.sense.base, self.noise)
         # the last crossing may lie beyond the end already
         height, sd = mean_height(line.crossings[:-1] or line.crossings)

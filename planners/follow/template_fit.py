@@ -103,9 +103,19 @@ def dip_shape(tip_radius: float) -> Shape:
 
 def end_shape(sign: float, tip_radius: float) -> Shape:
     """A crest that runs from x < 0 and ends at x = 0 in a round cap; a groove that ends at an edge."""
+    return lambda x, h: end_heights(x, np.zeros_like(x), h, sign, tip_radius)
+
+
+def end_heights(u: FloatArray, v: FloatArray, crest: float, sign: float, tip_radius: float) -> FloatArray:
+    """|Height| at (u, v) of a thin line along v = 0 that runs from u < 0 and ends at u = 0, m.
+
+    Of a ridge the ball rides over the cap at its end. Over a slot it sinks by d^2 / (2 r) between the edges that hold
+    it, d from the nearest one.
+    """
     if sign > 0:
-        return lambda x, h: cap_height(np.maximum(x, 0.0), h, 0.5 * h, tip_radius)
-    return lambda x, h: np.clip(-x, 0.0, np.sqrt(2.0 * tip_radius * h)) ** 2 / (2.0 * tip_radius)
+        return cap_height(np.hypot(np.maximum(u, 0.0), v), crest, 0.5 * crest, tip_radius)
+    inside = np.minimum(np.maximum(-u, 0.0), np.maximum(np.sqrt(2.0 * tip_radius * crest) - np.abs(v), 0.0))
+    return np.asarray(inside**2 / (2.0 * tip_radius))
 
 
 def edge_shape(tip_radius: float) -> Shape:

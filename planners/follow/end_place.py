@@ -1,0 +1,160 @@
+"""End place: where a line ends, along it and across, by sweeps across it on either side of the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.instrument import Noise
+from planners.follow.template_fit import covariance_of_means, end_heights, means_in_bins
+
+# Where sweeps may cross the line, in half-widths of its disturbance beyond the end
+OFFSETS = np.linspace(-1.0, 0.9, 20)
+# Bare base that a sweep takes in beside the disturbance, in half-widths
+BARE_MARGIN = 0.3
+# Bins of a sweep that was not made yet; and the step of a derivative, in half-widths, heights and rad
+FORETOLD_BINS, DERIVATIVE_STEP = 40, 1e-3
+# Standard deviations of chi-squared beyond which something else is felt than a line that ends
+MISFIT_SDS = 5.0
+# By how much a line may turn where it ends, of which nothing is felt before: standard deviation, rad
+UNKNOWN_TURN = 0.3
+
+
+@dataclass(frozen=True)
+class EndSection:
+    """The trace about an end, in coordinates of the base: u along the line, beyond the end, and v to the left of it.
+
+    Args:
+        sign: +1 for ridges, -1 for grooves.
+        half_width: of the disturbance across the line, m.
+        tip_radius: m.
+        wide: how much wider shapes along and across the line would be on a flat base.
+        shear: by how much u of what lies over a place changes with v, on a base that is twisted along the line.
+    """
+
+    sign: float
+    half_width: float
+    tip_radius: float
+    wide: tuple[float, float] = (1.0, 1.0)
+    shear: float = 0.0
+
+    @property
+    def beyond(self) -> float:
+        """How far beyond the end of a ridge the ball still touches it, m, at a height that makes it so wide."""
+        return self.half_width * self.wide[1] / self.wide[0]
+
+    def heights(self, u: FloatArray, v: FloatArray, place: FloatArray) -> FloatArray:
+        """|Height| (N,) over the base, m, of a crest that ends at place[:2] (m), turned by place[2] (rad) and place[3]
+        high (m)."""
+        long, wide = self.wide
+        high = max(float(place[3]), 0.0)
+        thin = np.sqrt(2.0 * self.tip_radius * high) / (wide * self.half_width)
+        du, dv = u - place[0], v - place[1]
+        along, across = du + (place[2] + self.shear) * dv, dv - place[2] * du
+        return end_heights(long * along, thin * wide * across, high, self.sign, self.tip_radius)
+
+    def derivatives(self, u: FloatArray, v: FloatArray, place: FloatArray) -> FloatArray:
+        """(N, 4) of the heights, by what `place` holds."""
+        step = DERIVATIVE_STEP * np.array([self.half_width, self.half_width, 1.0, place[3]])
+        columns = [self.heights(u, v, place + each) - self.heights(u, v, place - each) for each in np.diag(step)]
+        return np.column_stack(columns) / (2.0 * step)
+
+
+@dataclass(frozen=True, eq=False)
+class Across:
+    """A sweep across the line.
+
+    Args:
+        offset: how far beyond the end, as it was first found, m.
+        half: half its length, m.
+        told: (4, 4) information that one pass gives on the end's place, the line's turn and its height.
+    """
+
+    offset: float
+    half: float
+    told: FloatArray
+
+
+@dataclass(eq=False)
+class EndPlace:
+    """Where a line ends, by least squares of all sweeps across it.
+
+    Args:
+        section: what the trace looks like there.
+        noise: of the samples.
+        place: (4,) as the section has it, from where the end was first found.
+        sd: (4,) standard deviations of it, by what was felt before.
+        fits: False if a line that ends does not explain what was felt.
+    """
+
+    section: EndSection
+    noise: Noise
+    place: FloatArray
+    sd: FloatArray
+    fits: bool = field(init=False, default=True)
+    _felt: dict[float, list[tuple[FloatArray, FloatArray]]] = field(init=False, default_factory=dict)
+    _before: tuple[FloatArray, FloatArray] = field(init=False)  # place, and the root of what was told of it
+    _told: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        known = 1.0 / np.maximum(self.sd, 1e-6 * np.array([*2 * [self.section.half_width], 1.0, self.place[3]]))
+        self._before, self._told = (self.place, known), np.diag(known**2)
+
+    def sweeps(self, spacing: float) -> list[Across]:
+        """All sweeps that could be made, with samples so far apart, m; what each tells, by what is known by now."""
+        half_width, made = self.section.half_width, []
+        for offset in OFFSETS * half_width:
+            gone = min(max(offset - self.place[0], 0.0) / self.section.beyond, 1.0) if self.section.sign > 0 else 0.0
+            half = (float(np.sqrt(1.0 - gone**2)) + BARE_MARGIN) * half_width
+            edges = np.linspace(-half, half, FORETOLD_BINS + 1)
+            v = 0.5 * (edges[1:] + edges[:-1])
+            samples = np.full(FORETOLD_BINS, 2.0 * half / FORETOLD_BINS / spacing)
+            root = np.linalg.cholesky(covariance_of_means(v, samples, self.noise))
+            slopes = np.linalg.solve(root, self.section.derivatives(np.full_like(v, offset), v, self.place))
+            made.append(Across(float(offset), half, slopes.T @ slopes))
+        return made
+
+    def gain(self, sweep: Across, passes: int, enough: FloatArray) -> float:
+        """By how much so many more passes reduce the variances of the place, m^2, down to what is enough (2,) m."""
+        now, then = (
+            np.maximum(np.diag(np.linalg.inv(told))[:2], enough**2).sum()
+            for told in (self._told, self._told + passes * sweep.told)
+        )
+        return float(now - then)
+
+    def learn(self, sweep: Across, across: FloatArray, heights: FloatArray) -> None:
+        """One more pass: its places across the line (N,) and heights over the base (N,), m."""
+        self._felt.setdefault(sweep.offset, []).append((across, heights))
+
+    def solve(self) -> None:
+        """The best place by all passes so far, and how well it is known."""
+        from scipy.linalg import solve_triangular
+        from scipy.optimize import least_squares
+
+        sweeps = []
+        for offset, felt in self._felt.items():
+            v, heights = (np.concatenate(parts) for parts in zip(*felt, strict=True))
+            order = np.argsort(v, kind="stable")
+            at, mean, samples = means_in_bins(v[order], heights[order])
+            # the correlated part of the noise averages out over the passes, not along them
+            root = np.linalg.cholesky(covariance_of_means(at, samples, self.noise.of_passes(len(felt))))
+            sweeps.append((np.full_like(at, offset), at, self.section.sign * mean, root))
+        first, known = self._before
+
+        def residual(place: FloatArray) -> FloatArray:
+            parts = [
+                solve_triangular(root, self.section.heights(u, v, place) - mean, lower=True, check_finite=False)
+                for u, v, mean, root in sweeps
+            ]
+            return np.concatenate([*parts, known * (place - first)])
+
+        half_width = self.section.half_width
+        scale = 0.01 * np.array([half_width, half_width, 1.0, first[3]])
+        fit = least_squares(residual, self.place, x_scale=scale)
+        jacobian = np.asarray(fit.jac)
+        self.place, self._told = np.asarray(fit.x), jacobian.T @ jacobian
+        self.sd = np.sqrt(np.diag(np.linalg.inv(self._told)))
+        means = sum(len(at) for _, at, _, _ in sweeps)
+        self.fits = bool(2.0 * fit.cost <= means + MISFIT_SDS * np.sqrt(2.0 * means))
