@@ -19,7 +19,7 @@ from mapping.base import Base, LaidTrace
 from mapping.detection import FoundHeights, found_heights, lost_heights, narrowest_groove
 from mapping.geometry.mesh import asked_part, faces_side
 from planners import Survey
-from planners.paths import Carrier, reachable, resampled
+from planners.paths import Carrier, held_up, reachable, resampled
 
 # More of the reachable surface than this not swept: said first, and the command's exit status is not 0
 MOST_UNSWEPT = 0.05
@@ -129,7 +129,9 @@ class SurfaceAccount:
     def of_plan(
         cls, moves: Sequence[Any], refused: Sequence[tuple[Any, str]], base: Base, scene: Scene
     ) -> SurfaceAccount | None:
-        """The account of planned moves, as if every sweep touched the bare body.
+        """The account of planned moves: what every ball pressed along a sweep touches of the bare body.
+
+        That is not where it is commanded to: in folds and inner corners another part of the body holds it up.
 
         Args:
             moves: hw.Move, those that break no limit.
@@ -140,11 +142,14 @@ class SurfaceAccount:
         sweeps = [move for move in moves if move.purpose == "sweep"]
         refusals = [move for move, _ in refused if move.purpose == "sweep"]
         spacing = TOUCHED_SPACING * scene.tip.radius
-        dense = []
+        dense = [(np.zeros((0, 3)), np.zeros((0, 3)))]
         for move in sweeps:
-            touched = scene.finger.touches(move, scene.tip.radius) if len(move.path) > 1 else move.path
-            dense.append(resampled(move.path, move.approach, spacing)[0] if touched is None else touched)
-        feet = base.foot(np.concatenate(dense) if dense else np.zeros((0, 3)), scene.tip.radius)
+            at_once = (move.path, move.approach)
+            touched = scene.finger.touches(move, scene.tip.radius) if len(move.path) > 1 else at_once
+            dense.append(resampled(*at_once, spacing) if touched is None else touched)
+        centers, pressed = (np.concatenate(parts) for parts in zip(*dense, strict=True))
+        held = held_up(centers, pressed, base, scene.tip.radius)
+        feet = base.foot(centers - held[:, None] * pressed, scene.tip.radius)
         part = asked_part(base.surface, **scene.model.asked)
         found = found_heights(part or base.surface, feet.points, feet.normals, scene.tip.radius)
         return cls(

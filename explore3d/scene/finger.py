@@ -99,8 +99,9 @@ class FingerTable(Table):
         """Mesh and unit of what it touches, where that is a file; the truth of a simulation."""
         return None
 
-    def touches(self, move: Move, tip_radius: float) -> FloatArray | None:
-        """(N, 3) the ball's commanded centres where it touches along a sweep, m; None: all along it."""
+    def touches(self, move: Move, tip_radius: float) -> tuple[FloatArray, FloatArray] | None:
+        """Where it touches along a sweep: the ball's commanded centres (N, 3), m, and unit directions in which it is
+        pressed (N, 3); None: all along it."""
         return None
 
     def follows(self, tip_radius: float, smallest: float) -> tuple[float, float] | None:

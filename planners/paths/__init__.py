@@ -16,7 +16,7 @@ if TYPE_CHECKING:
         touched_points as touched_points,
     )
     from planners.paths.reach import reachable as reachable
-    from planners.paths.sound import resampled as resampled, sound_parts as sound_parts
+    from planners.paths.sound import held_up as held_up, resampled as resampled, sound_parts as sound_parts
     from planners.paths.strokes import Strokes as Strokes, tangential as tangential, to_and_fro as to_and_fro
     from planners.paths.travel import Ways as Ways, routed as routed
 
@@ -27,7 +27,7 @@ _PUBLIC = {
     "limits": ("Limits",),
     "pressed_path": ("PRESS", "pressed_sweep", "thinned", "touched_points"),
     "reach": ("reachable",),
-    "sound": ("resampled", "sound_parts"),
+    "sound": ("held_up", "resampled", "sound_parts"),
     "strokes": ("Strokes", "tangential", "to_and_fro"),
     "travel": ("Ways", "routed"),
 }

@@ -57,9 +57,9 @@ class GrblFingerTable(FingerTable):
         """Mesh and unit of what the emulated machine touches."""
         return None if self.object is None else (self.object, self.units)
 
-    def touches(self, move: Move, tip_radius: float) -> FloatArray | None:
+    def touches(self, move: Move, tip_radius: float) -> tuple[FloatArray, FloatArray] | None:
         """Where it pecks."""
-        return _peck(self.machine, tip_radius).places(move)[0] if self.machine.touch == "peck" else None
+        return _peck(self.machine, tip_radius).places(move) if self.machine.touch == "peck" else None
 
     def finger(self, setting: Setting) -> Finger:
         """It pecks, or slides; an emulated one brings its emulator along."""

@@ -18,7 +18,10 @@ from explore3d.jobs.plan import DryRun, plan_scene
 from explore3d.jobs.run import run, scene_finger
 from explore3d.scene.scene import parse_scene
 from hw.simulated import SimulatedFinger
+from mapping import Surface
+from mapping.base import Base
 from mapping.detection import narrowest_groove
+from planners.paths import pressed_sweep
 
 WIRE = Path(__file__).resolve().parents[3] / "assets" / "scenes" / "wire_on_plate.toml"
 TEXT = WIRE.read_text()
@@ -305,3 +308,28 @@ def test_of_many_moves_that_break_a_limit_some_are_told(tmp_path: Path) -> None:
     assert sum(line.startswith("move ") for line in many.lines()) == 10 and len(many.record()["violations"]) == 14
     few = replace(plan, violations=((1, "too far"),))
     assert few.lines()[-1] == "move 1: too far"
+
+
+def test_a_sweep_that_another_wall_holds_up_is_accounted_for_where_the_ball_rests() -> None:
+    wall, radius, steep = 12e-3, 3e-3, np.radians(40.0)
+    upward, outward = np.array([0.0, np.cos(steep), np.sin(steep)]), np.array([0.0, -np.sin(steep), np.cos(steep)])
+    corners = [
+        [x, side * up * upward[1], up * upward[2]] for side, up in ((-1, wall), (1, 0), (1, wall)) for x in (0, 0.02)
+    ]
+    valley = Surface(np.array(corners), np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]]))
+    text = f"""
+schema = "explore3d/scene/1"
+tip = {{ radius = {radius} }}
+model = {{ mesh = "valley" }}
+finger = {{ kind = "simulated", object = "valley", noise = {{ white = 1e-5 }} }}
+survey = {{ smallest_feature = 1e-4 }}
+"""
+    scene, base = parse_scene(text, "valley.toml", {"valley": valley}), Base(valley)
+    ends, normals = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]]), np.tile(outward, (2, 1))
+    # so far up each wall it touches both
+    touching = radius * np.tan(steep)
+    deep, rests = (pressed_sweep(ends + up * upward, normals, radius, 0.03, 1.0) for up in (touching - 2e-4, touching))
+    told, true = (SurfaceAccount.of_plan([move], [], base, scene) for move in (deep, rests))
+    assert told is not None and true is not None
+    # pressed deeper it rests on the other wall alone
+    assert told.swept == pytest.approx(0.5 * true.swept, abs=0.002)
