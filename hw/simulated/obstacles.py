@@ -120,7 +120,8 @@ def stopped_or_landed(
     if len(hit):
         where = np.round(path[hit[0]], 6).tolist()
         raise StoppedError(
-            f"the sweep runs into a wall {1e3 * rise[hit[0]]:.2f} mm high at {where} m; the finger has drawn back"
+            f"the sweep runs into a wall {1e3 * rise[hit[0]]:.2f} mm high at {where} m; the finger has drawn back",
+            path[hit[0]],
         )
     # an edge that is run off: the ball comes down no faster than it can, and no slower than it may ride
     lowest = np.maximum(fall, np.tan(field_angle) * np.append(steps, steps[-1:]))[: len(height)]

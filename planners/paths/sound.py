@@ -32,6 +32,9 @@ WALL_ROOM = 0.03
 SOUND_SPACING, SHORTEST_PART = 0.2, 0.3
 # How far a finger backs off before it goes elsewhere, in tip radii (hw.probing.grbl_finger does the same)
 BACK_OFF_DISTANCE = 0.5
+# Of a sweep that ran into something so much about that is left out, and shorter parts are not worth a sweep, in tip
+# radii: a detail a sixth of a radius high lifts the ball as far as 0.58 of one beside it, and nobody knows its extent
+BESIDE_WALL, LEAST_BESIDE = 1.0, 2.0
 # About a sweep's ends the approach may be turned so that the finger can draw back, over so much, in tip radii
 LEAVING_STRETCH = 1.0
 # Lifted so far the ball has left what it is pressed against (its press is 0.02) but for that room, in tip radii
@@ -63,6 +66,20 @@ def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
     stretches = (part for run in runs(free) for part in _left(path[run], approach[run], roomy, carrier))
     parts = (replace(move, path=part[0], approach=part[1]) for part in stretches if len(part[0]) > 1)
     return [part for part in parts if part.length >= SHORTEST_PART * tip]
+
+
+def beside(move: Move, place: FloatArray, carrier: Carrier) -> list[Move]:
+    """What is left of a sweep that ran into something with the ball's centre at a place (3,), m: up to it, and on.
+
+    None of a sweep that does not lead there, so that it is not tried again, and none of what is too short to tell.
+    """
+    tip = carrier.tip_radius
+    path, approach = resampled(move.path, move.approach, SOUND_SPACING * tip)
+    off = np.linalg.norm(path - place, axis=1) > BESIDE_WALL * tip
+    if move.purpose != "sweep" or off.all():
+        return []
+    parts = (replace(move, path=path[run], approach=approach[run]) for run in runs(off) if len(run) > 1)
+    return [each for part in parts if part.length >= LEAST_BESIDE * tip for each in sound_parts(part, carrier)]
 
 
 def resting_at_its_ends(move: Move, carrier: Carrier) -> Move:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,7 +19,7 @@ from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
 from planners.paths.detour import Detour
 from planners.paths.felt_details import DETAIL_ROOM, FeltDetails
 from planners.paths.room import room_about
-from planners.paths.sound import BACK_OFF_DISTANCE, can_be_left, resampled, resting_at_its_ends, sound_parts
+from planners.paths.sound import BACK_OFF_DISTANCE, beside, can_be_left, resampled, resting_at_its_ends, sound_parts
 
 # Places of a way lie at most so far apart where it is looked whether it is free, in tip radii
 FREE_SPACING = 0.25
@@ -79,6 +80,7 @@ def dense(path: FloatArray, spacing: float) -> FloatArray:
 def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = None) -> Plan:
     """The plan with travel put before every move that cannot be reached straight, and sweeps split where they offend.
 
+    Of a sweep that ran into something nobody knew what leads up to that and what leads on is made.
     What was made is learnt from what the driver sends back: after a planners.Refused the finger still stands where
     the last executed move ended. The plan is sent a planners.Parted for a move that was made in parts or after travel.
     What was refused is not asked again, in neither direction, until another move was made: nothing has changed, and
@@ -105,8 +107,9 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
             parts = sound_parts(move, ways.carrier) or [move]
         if check is not None and move.purpose == "sweep":
             parts = [resting_at_its_ends(part, ways.carrier) for part in parts]
-        felt, made = [], []
-        for part in parts:
+        felt, made, waiting = [], [], deque(parts)
+        while waiting:
+            part = waiting.popleft()
             answer, travelled, done = yield from _reached(part, before, ways)
             before = _as_felt(done, answer, ways.carrier) if done is not None else travelled or before
             if ways.felt is not None:
@@ -114,6 +117,8 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
             if done is not None:
                 felt.append(answer)
                 made.extend([done] if travelled is None else [travelled, done])
+            elif check is not None and isinstance(answer, Refused) and answer.touching is not None:
+                waiting.extendleft(reversed(beside(part, answer.touching, ways.carrier)))
         if made and made != [move]:
             answer = Parted.of(felt, made)
         if made:

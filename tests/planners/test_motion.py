@@ -357,6 +357,28 @@ def test_a_plan_is_told_where_the_ball_ran_into_something() -> None:
     assert 5e-3 < answers[0].touching[0] < 6e-3 + R
 
 
+def test_of_a_sweep_that_runs_into_an_unknown_wall_the_rest_is_made() -> None:
+    # the ball, which cannot ride up a wall of 0.93 radii, is stopped 4 mm before the middle of it
+    base = Base(over_a_floor((60, 60, 1), (0, 0, -2)))
+    body = over_a_floor((2, 6, 2.8), (0, 0, 1.4))
+    touch = SimulatedFinger(object=body, tip_radius=R, rate=500.0)
+    limits, answers = Limits.of(touch.workspace, base, R, FeltDetails(base, R)), list[Trace]()
+    over = sweep([-25, 0, 2.94], [25, 0, 2.94], -ABOVE)
+
+    def plan() -> Plan:
+        answers.append((yield over))
+        return Outcome("done")
+
+    refused: list[str] = []
+    ways = Ways(base, R, touch.workspace.low, touch.workspace.high, 0.07, limits.felt)
+    drive(
+        routed(plan(), ways, limits.violation), touch.execute, check=limits.violation, note=refused.append, empty=EMPTY
+    )
+    assert "runs into a wall" in refused[0] and len(refused) == 1
+    parts = executed(over, answers[0])
+    assert [np.round(1e3 * part.path[[0, -1], 0]).tolist() for part in parts] == [[-25.0, -7.0], [-1.0, 25.0]]
+
+
 def test_a_sweep_ends_where_the_other_wall_of_a_corner_holds_the_ball_up() -> None:
     slope = np.radians(25.0)
     corners = 1e-3 * np.array([[-30, -20, 0], [0, -20, 0], [30, -20, 0], [-30, 20, 0], [0, 20, 0], [30, 20, 0]])
