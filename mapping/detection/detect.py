@@ -179,6 +179,9 @@ def _detected(trace: Trace, laid: LaidTrace, asked: _Asked, of_each: Noise | Non
     raw = float(np.median([_step(sweep) for sweep in usable]))
     stretches = [] if noise else raw_stretches(usable)
     first = of_each or (floored(noise, tip) if noise else first_noise(stretches, raw, tip, base.known))
+    if asked.stated is not None and noise is None and of_each is None and base.known:
+        # most of a log may lie on details, and the noise that most samples tell is theirs then
+        first = floored(asked.stated.instead_of(first), tip)
     widest = LARGEST * tip if asked.largest is None else asked.largest
     of_sweeps = _profiles(usable, first, tip)
     keep, unfelt = _felt(laid, dict(zip(map(id, usable), of_sweeps, strict=True)))

@@ -36,6 +36,13 @@ class StatedNoise:
         """The same in other units of height and path."""
         return replace(self, noise=self.noise.scaled(1 / height, 1 / path))
 
+    def instead_of(self, guess: Noise) -> Noise:
+        """What is stated, and of what is not, a guess."""
+        law = self.noise
+        if law.correlated > 0:
+            guess = replace(guess, correlated=law.correlated, length=law.length)
+        return replace(guess, white=law.white) if law.white > 0 else guess
+
     def surprise(self, noise: Noise) -> float:
         """Twice the negative logarithm of a noise's density (Student's t in each logarithm), up to a constant."""
         total, least = 0.0, np.finfo(float).tiny
