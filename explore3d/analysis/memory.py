@@ -10,9 +10,12 @@ from collections.abc import Callable
 # share of draws (threads.MOST_VALUES), of which a posterior makes thousands. Once it is set, free memory goes back to
 # the system as well, which glibc leaves off when large arrays come and go: the paper's wire took 620 MB, not 530
 M_MMAP_THRESHOLD, OWN_PAGES = -3, 2**24
-# And how much may stay free before it goes back: by default 128 kB, so that every array of a few hundred kB has its
-# pages made and cleared anew: on the paper's wire 650,000 of them, in 1.3 CPU s; with 4 MB 220,000, in 0.7
-M_TRIM_THRESHOLD, KEPT_FREE = -1, 2**22
+# And how much may stay free before it goes back: what a thread's share of draws holds at once (five times 8 MB, see
+# threads.MOST_VALUES). By default it is 128 kB, and each array of a few hundred kB, with 4 MB each of some MB, has its
+# pages made and cleared anew: 1,290,000 of them in an analysis of the mug, in 6.2 CPU s of the system, and 1,030,000
+# (3.2 s) of the folds; with 16 MB 290,000 and 600,000 (2.2 s), with 64 MB 190,000 (1.1 s) and 210,000 (1.4 s). The
+# most memory that either takes, 640 and 620 MB, is the same with all of them
+M_TRIM_THRESHOLD, KEPT_FREE = -1, 2**26
 # And in how many places memory is taken from: one for each thread by default, each with holes of its own
 M_ARENA_MAX, PLACES = -8, 1
 

@@ -1,0 +1,31 @@
+"""What is set free goes back to the system, but what is asked for again at once stays."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+ARRAYS_AT_ONCE = """
+import resource
+import numpy as np
+from explore3d.analysis import leave_no_holes
+
+def some():
+    return [np.ones(2**18) for _ in range(20)]
+
+leave_no_holes()
+some()
+before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for _ in range(10):
+    some()
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="settings of glibc")
+def test_arrays_that_come_and_go_keep_their_pages() -> None:
+    told = subprocess.run([sys.executable, "-c", ARRAYS_AT_ONCE], capture_output=True, text=True, check=True)
+    # 40 MB are 10,240 pages, which were made anew each time
+    assert int(told.stdout) < 10_240
