@@ -49,6 +49,13 @@ def best_segment(flat, height, weight, angles, size, cell_u, cell_v, section, le
                 signal[column + 1] = signal[column] + match[column]
                 square[column + 1] = square[column] + power[column]
             for length in lengths:
+                better = 0
+                for column in range(columns - length + 1):  # hardly ever one is: told for several at a time
+                    worth = square[column + length] - square[column]
+                    felt = signal[column + length] - signal[column]
+                    better += (worth > least) & (felt * felt > best_square * worth)
+                if better == 0:
+                    continue
                 for column in range(columns - length + 1):
                     worth = square[column + length] - square[column]
                     felt = signal[column + length] - signal[column]
