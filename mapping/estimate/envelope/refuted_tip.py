@@ -332,11 +332,14 @@ def _over_all_sizes(paths: list[_Path], radius: float, resolution: float, sought
         paths = [path for path in paths if len(path) >= 4 * size]
         for path in paths:
             path.bent(size)
-        scattered = [path.scales[-1].rise / path.scales[-1].sd for path in paths]
-        count = sum(map(len, scattered))
-        if count < FEWEST_SCATTERED:
+        scales = [path.scales[-1] for path in paths]
+        ends = np.cumsum([0, *(len(scale.rise) for scale in scales)])
+        if ends[-1] < FEWEST_SCATTERED:
             return
-        scatter = robust_scale(np.concatenate(scattered)[:: 1 + count // SCATTERED])
+        apart = 1 + int(ends[-1]) // SCATTERED
+        some = [np.arange(-begin % apart, len(scale.rise), apart) for begin, scale in zip(ends, scales, strict=False)]
+        scattered = [scale.rise[k] / scale.sd_of(k) for k, scale in zip(some, scales, strict=True)]
+        scatter = robust_scale(np.concatenate(scattered))
         for path in paths:
             path.scales[-1].levels = scatter * path.scales[-1].levels
             if size >= sought.block:
