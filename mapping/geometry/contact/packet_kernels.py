@@ -34,6 +34,7 @@ from mapping.geometry.mesh import (
     closest,
     dot,
     inlined,
+    lanes,
     moved,
     push_lanes,
     scaled,
@@ -66,11 +67,13 @@ def first_contacts(  # type: ignore[no-untyped-def]
         frame: (x, y, z, unit) of that frame, m.
         origins: (N, 3) m; directions: (N, 3) or (1, 3) unit vectors.
     """
-    stack, apart, late = np.empty(STACK, np.int32), np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
+    stack, found = np.empty(STACK, np.int32), lanes(2)
+    apart, late = found[0], found[1]
     near = np.empty(max(len(rows), MOST_TRIANGLES), np.int32)
     steps, touched, places = np.empty(len(near)), np.empty((len(near), 3)), np.empty((MOST_DISTINCT_CONTACTS, 3))
     own_rows, own_order = np.empty((MOST_TRIANGLES, rows.shape[1])), np.empty(MOST_TRIANGLES, np.int32)
-    own_leaves = np.zeros((MOST_TRIANGLES // WIDTH, leaves.shape[1], WIDTH), np.float32)
+    own_leaves = lanes(MOST_TRIANGLES // WIDTH * leaves.shape[1]).reshape((-1, leaves.shape[1], WIDTH))
+    own_leaves[:] = 0.0
     own_links, own = np.empty((MOST_TRIANGLES // WIDTH, 2), np.int32), np.empty(MOST_TRIANGLES, np.int32)
     ways = np.empty((MOST_QUERIES, 9))
     guess, width, pause = -1, LEAST_QUERIES, FIRST_PAUSE

@@ -10,7 +10,6 @@ from numba import njit
 from mapping.geometry.contact.contact_kernels import way_to_body
 from mapping.geometry.mesh import (
     STACK,
-    WIDTH,
     borrowing,
     closest,
     closest_on_triangle,
@@ -18,6 +17,7 @@ from mapping.geometry.mesh import (
     corners,
     dot,
     enter_triangle,
+    lanes,
     moved,
     push_lanes,
     scaled,
@@ -33,7 +33,8 @@ def retreats(rows, leaves, boxes, links, ball, size, outward, centers, backward,
     `outward` is +1 if the normals of the faces point out of the body, -1 if they point into it.
     """
     stack = np.empty(STACK, np.int32)
-    apart, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
+    found = lanes(2)
+    apart, late = found[0], found[1]
     for q in range(len(centers)):
         o, d = vector(centers, q), vector(backward, q)
         start, length = way_to_body(o, d, 1.001 * (size + ball[1]))

@@ -14,7 +14,12 @@ if TYPE_CHECKING:
         nearest_boxed as nearest_boxed,
         nearest_from as nearest_from,
     )
-    from mapping.geometry.mesh.bvh_kernels import STACK as STACK, WIDTH as WIDTH, push_lanes as push_lanes
+    from mapping.geometry.mesh.bvh_kernels import (
+        STACK as STACK,
+        WIDTH as WIDTH,
+        lanes as lanes,
+        push_lanes as push_lanes,
+    )
     from mapping.geometry.mesh.clip import (
         FELT_SIDE_COSINE as FELT_SIDE_COSINE,
         asked_part as asked_part,
@@ -71,7 +76,7 @@ _PUBLIC = {
     "atomic_write": ("write_whole",),
     "borrowing_kernels": ("borrowing", "inlined"),
     "box_kernels": ("MOST_WAITING", "POINTS_PER_BOX", "boxes_about", "nearest_boxed", "nearest_from"),
-    "bvh_kernels": ("STACK", "WIDTH", "push_lanes"),
+    "bvh_kernels": ("STACK", "WIDTH", "lanes", "push_lanes"),
     "clip": ("FELT_SIDE_COSINE", "asked_part", "clipped", "faces_side"),
     "nearest": ("CREASE_ANGLE", "BoxedPoints", "MovedNearestPoint", "NearestPoint", "side_bulges", "unit_vectors"),
     "open3d_import": ("open3d",),

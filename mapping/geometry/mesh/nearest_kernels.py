@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from mapping.geometry.mesh.borrowing_kernels import borrowing, inlined
-from mapping.geometry.mesh.bvh_kernels import BOX_ROUNDING, STACK, WIDTH, push_lanes
+from mapping.geometry.mesh.bvh_kernels import BOX_ROUNDING, STACK, lanes, push_lanes
 from mapping.geometry.mesh.triangle_row_kernels import QUERIES_PER_BLOCK, closest, corners
 from mapping.geometry.mesh.vector_kernels import dot, moved, sub, vector
 
@@ -31,7 +31,8 @@ def nearest_points(  # type: ignore[no-untyped-def]
         part: (N,) INSIDE of it, or ON_EDGE and the number of the corner opposite, or ON_VERTEX and that of the corner.
     """
     stack = np.empty(STACK, np.int32)
-    apart, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
+    found = lanes(2)
+    apart, late = found[0], found[1]
     guess = 0
     for q in range(len(queries)):
         if q % QUERIES_PER_BLOCK == 0:

@@ -19,10 +19,10 @@ from numba import njit
 
 from mapping.geometry.mesh import (
     STACK,
-    WIDTH,
     closest,
     cross,
     dot,
+    lanes,
     moved,
     push_lanes,
     scaled,
@@ -57,6 +57,7 @@ LEAST_COSINE_OUT = 0.05
 @njit(cache=True)
 def workspace():  # type: ignore[no-untyped-def]
     """What a step writes to: found, normals, bounds, numbers, active, weights, stack, apart, late."""
+    room = lanes(2)
     return (
         np.empty(MOST_NEIGHBOURS, np.int64),
         np.empty((MOST_NEIGHBOURS, 3)),
@@ -65,8 +66,8 @@ def workspace():  # type: ignore[no-untyped-def]
         np.empty(4, np.int64),
         np.empty(4),
         np.empty(STACK, np.int32),
-        np.empty(WIDTH, np.float32),
-        np.empty(WIDTH, np.float32),
+        room[0],
+        room[1],
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from mapping.geometry.mesh.bvh_kernels import BOX_ROUNDING, WIDTH, leaf_tests
+from mapping.geometry.mesh.bvh_kernels import BOX_ROUNDING, CACHE_LINE, WIDTH, lanes, leaf_tests
 from mapping.geometry.mesh.tree import TriangleTree
 from mapping.geometry.mesh.triangle_kernels import closest_on_triangle
 from mapping.surface import Surface
@@ -49,3 +49,10 @@ def test_no_triangle_ahead_is_told_further_away_than_it_is(size: float, height: 
             told += 1
             close += np.sqrt(apart[lane]) > true - 0.5 * BOX_ROUNDING
     assert close > 0.3 * told > 0  # and of those ahead as a whole, it is their distance
+
+
+def test_the_lanes_of_a_node_lie_in_one_line_of_the_cache() -> None:
+    kept = [lanes(rows) for rows in range(1, 30)]  # at once: numba begins them at multiples of 32 bytes, by chance
+    assert all(room.shape == (rows, WIDTH) for rows, room in enumerate(kept, 1))
+    tree = TriangleTree(triangles(0.1, 1.0, np.random.default_rng(0)))
+    assert all(room.ctypes.data % CACHE_LINE == 0 for room in (*kept, tree.leaves))
