@@ -12,9 +12,9 @@ from collections.abc import Callable
 M_MMAP_THRESHOLD, OWN_PAGES = -3, 2**24
 # And how much may stay free before it goes back: what a thread's share of draws holds at once (five times 8 MB, see
 # threads.MOST_VALUES). By default it is 128 kB, and each array of a few hundred kB, with 4 MB each of some MB, has its
-# pages made and cleared anew: 1,290,000 of them in an analysis of the mug, in 6.2 CPU s of the system, and 1,030,000
-# (3.2 s) of the folds; with 16 MB 290,000 and 600,000 (2.2 s), with 64 MB 190,000 (1.1 s) and 210,000 (1.4 s). The
-# most memory that either takes, 640 and 620 MB, is the same with all of them
+# pages made and cleared anew: 1,030,000 of them in an analysis of the folds, in 3.2 CPU s of the system, with 16 MB
+# 600,000 (2.2 s), with 64 MB 210,000 (1.4 s); in a run of the mug 590,000 (1.8 s) and 230,000 (0.9 s). The most memory
+# that either takes, 620 and 640 MB, is the same with all of them
 M_TRIM_THRESHOLD, KEPT_FREE = -1, 2**26
 # And in how many places memory is taken from: one for each thread by default, each with holes of its own
 M_ARENA_MAX, PLACES = -8, 1
