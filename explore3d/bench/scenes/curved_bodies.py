@@ -97,7 +97,8 @@ def _curvatures(implicit: Implicit, feet: FloatArray) -> tuple[FloatArray, Float
     flat = np.eye(3) - normal[:, :, None] * normal[:, None, :]
     shape = flat @ second @ flat / steep[:, None, None]
     mean = 0.5 * np.trace(shape, axis1=1, axis2=2)
-    half = np.sqrt(np.maximum(0.5 * (shape**2).sum(axis=(1, 2)) - mean**2, 0.0))
+    # of what is left beside the mean curvature: a difference of squares keeps half of the digits at umbilics
+    half = np.sqrt(0.5 * ((shape - mean[:, None, None] * flat) ** 2).sum(axis=(1, 2)))
     return mean + half, mean - half
 
 

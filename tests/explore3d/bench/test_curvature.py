@@ -72,6 +72,11 @@ def test_a_curved_body_lies_on_its_surface_and_faces_outward(body, sampling):
     assert np.abs(shaken.k1 - still.k1).max() < 0.2 * largest
 
 
+def test_the_truth_keeps_all_its_digits_where_both_curvatures_are_one():
+    sphere = curved_body("sphere", "irregular", 0.0, 3)
+    np.testing.assert_allclose([sphere.k1, sphere.k2], 1.0, rtol=0, atol=2e-15)
+
+
 def test_the_seeds_that_are_reported_are_not_those_of_tuning():
     assert not set(bench.CURVATURE_SEEDS) & set(bench.CURVATURE_TUNING_SEEDS)
 
