@@ -28,9 +28,13 @@ BIAS_ALLOWANCE_SDS = 3.5
 # Weights fall with this power of the squared error: 1 averages most, large powers choose.
 WEIGHT_EXPONENT = 0.75
 SAMPLE = 3000
-# Ordinates are bent by what was found over planes, and then once more by what was found so. On spheres with noise the
-# second time halves the errors of the bend, and with them those of the widest fits; a third changes nothing.
-BENDING_SAMPLES = (1000, SAMPLE)
+# Ordinates are bent by what was found over planes on so many points, and then once more by what was found so on the
+# sample. On spheres with noise the second time halves the errors of the bend, and with them those of the widest fits; a
+# third changes nothing.
+FIRST_BENDS = 1000
+# Without noise a bend is as exact as the fits that it is found with: as long as the last made the stated errors smaller
+# by this factor, another one follows. Noise and what no bend straightens let the second make them smaller by 4 at most.
+WORTH_ANOTHER = 10.0
 # Of so many the share of the weight that falls to some sizes is known to 1.6 % (of shares between 0 and 1 the standard
 # deviation is half at most): a sixth of what may be lost
 WEIGHED_SAMPLE = 1000
@@ -93,12 +97,10 @@ def jets_and_noise(
         if neighbours is None
         else [neighbours]
     )
-    level = noise / size if noise is not None else jets.noise()
+    known = None if noise is None else noise / size
+    level = jets.noise() if known is None else known
     if neighbours is None:
-        for count in BENDING_SAMPLES:
-            jets.bend(sizes, level, count)
-            # over a plane what is steep in a thin neighbourhood looks like noise
-            level = noise / size if noise is not None else jets.noise()
+        level = jets.bend_all(sizes, level, known)
     if len(index) > LARGE_MESH_POINTS:
         sizes = jets.worthwhile(sizes, level)
     operators, slopes, error = jets.weighed(sizes, level, fixed=neighbours is not None)
@@ -204,8 +206,22 @@ class _Jets:
         growth = (SMALL[1] / SMALL[0]) ** (self.degree + 1)
         return float(np.sqrt(max((growth * first - second) / (growth - 1), NOISE_FLOOR**2 * first)))
 
-    def bend(self, sizes: IntArray, noise: float, count: int) -> None:
-        """Bend all ordinates by the larger curvature at the nearest point of a sample, found with the present bend."""
+    def bend_all(self, sizes: IntArray, level: float, known: float | None) -> float:
+        """Bend all ordinates until that helps no more; the noise, told anew each time unless it is known."""
+        told = self.bend(sizes, level, FIRST_BENDS)
+        while True:
+            # over a plane what is steep in a thin neighbourhood looks like noise
+            level = self.noise() if known is None else known
+            before, told = told, self.bend(sizes, level, SAMPLE)
+            if not WORTH_ANOTHER * told < before:
+                return self.noise() if known is None else known
+
+    def bend(self, sizes: IntArray, noise: float, count: int) -> float:
+        """Bend all ordinates by the larger curvature at the nearest point of a sample, found with the present bend.
+
+        Returns:
+            median of the stated errors of what they are bent by, 0 if there is none.
+        """
         from scipy.spatial import cKDTree
 
         sample = self.sample(count)
@@ -221,8 +237,12 @@ class _Jets:
         mean, half2 = 0.5 * (a + c), 0.25 * (a - c) ** 2 + b**2
         half = np.sqrt(np.maximum(half2 - 0.75 * error**2, 0.0))
         larger = np.nan_to_num(np.where(mean < 0, mean - half, mean + half))
+        # on a sphere z + k z^2 / (2 cos t) is quadratic where the axis of z leans from the normal by t
+        larger *= np.sqrt(1.0 + (np.einsum("msd,msdk->km", np.nan_to_num(weights), found.slopes) ** 2).sum(axis=0))
         boxed = BoxedPoints(self.place[sample])
         self.bends = larger[by_shares(lambda place: boxed.nearest(place)[1], self.place, NEAREST_COST)]
+        known = np.isfinite(error)
+        return float(np.median(error[known])) if known.any() else 0.0
 
     def worthwhile(self, sizes: IntArray, noise: float) -> IntArray:
         """The sizes that points of a sample give most weight to, with those that judge them."""

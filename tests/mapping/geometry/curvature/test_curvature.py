@@ -109,6 +109,16 @@ def test_a_jet_that_cannot_be_is_refused_by_name():
         principal_curvatures(surface, "jet", degree=4, neighbours=18)
 
 
+def test_a_sphere_between_thin_uneven_vertices_is_known_to_rounding():
+    rng = np.random.default_rng(4)
+    away = rng.normal(size=(400, 3))
+    points = 0.7 * away / np.linalg.norm(away, axis=1, keepdims=True)
+    found = principal_curvatures(points, "jet")
+    error = np.abs(np.concatenate([found.k1, found.k2]) - 1 / 0.7)
+    assert np.median(error) < 1e-12
+    assert (error < 1.645 * np.tile(found.sd, 2)).mean() > 0.8
+
+
 def test_curvature_is_the_same_surface_scaled_from_nanometres_to_kilometres():
     surface = grid(lambda x, y: 0.3 * x**2 - 0.2 * y**2 + 0.1 * x**3, 25)
     plain = principal_curvatures(surface)
