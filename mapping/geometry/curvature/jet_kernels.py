@@ -160,34 +160,36 @@ def _determined(triangle, columns, ratio):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _solve(triangle, heights, columns, coefficients):  # type: ignore[no-untyped-def]
-    """Coefficients of the nested fit of so many columns; `heights` is the row of the heights."""
-    for j in range(columns):
-        coefficients[j] = triangle[heights, j]
-    for c in range(columns - 1, -1, -1):
-        coefficients[c] /= triangle[c, c]
-        for j in range(c):
-            coefficients[j] -= triangle[c, j] * coefficients[c]
+def _solve(triangle, columns, heights, inverse, coefficients, factors):  # type: ignore[no-untyped-def]
+    """Coefficients (D, 6) up to second degree of all nested fits of at most so many columns, and the variance factors
+    (D,) of their curvatures (squared Frobenius norms).
 
-
-@njit(cache=True)
-def _variances(triangle, columns, rows, factors):  # type: ignore[no-untyped-def]
-    """Variance factors of the curvatures (squared Frobenius norms) of all nested fits of at most so many columns.
-
-    Those of fewer columns are the first terms of those of more.
+    Six rows of the inverse of R tell all of them: what is summed over fewer columns is the fit of these alone.
+    `heights` is the row of the heights, `inverse` room for (columns, 6).
     """
+    s0, s1, s2, s3, s4, s5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     a, b, c, option = 0.0, 0.0, 0.0, 0
-    for j in range(3, columns):
-        r0, r1, r2 = 1.0 if j == 3 else 0.0, 1.0 if j == 4 else 0.0, 1.0 if j == 5 else 0.0
-        for k in range(3, j):
-            r0 -= triangle[j, k] * rows[0, k]
-            r1 -= triangle[j, k] * rows[1, k]
-            r2 -= triangle[j, k] * rows[2, k]
-        rows[0, j], rows[1, j], rows[2, j] = r0 / triangle[j, j], r1 / triangle[j, j], r2 / triangle[j, j]
-        a += rows[0, j] * rows[0, j]
-        b += rows[1, j] * rows[1, j]
-        c += rows[2, j] * rows[2, j]
+    for j in range(columns):
+        r0, r1, r2 = 1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0
+        r3, r4, r5 = 1.0 if j == 3 else 0.0, 1.0 if j == 4 else 0.0, 1.0 if j == 5 else 0.0
+        for k in range(j):
+            share = triangle[j, k]
+            r0 -= share * inverse[k, 0]
+            r1 -= share * inverse[k, 1]
+            r2 -= share * inverse[k, 2]
+            r3 -= share * inverse[k, 3]
+            r4 -= share * inverse[k, 4]
+            r5 -= share * inverse[k, 5]
+        own, height = 1.0 / triangle[j, j], triangle[heights, j]
+        r0, r1, r2, r3, r4, r5 = r0 * own, r1 * own, r2 * own, r3 * own, r4 * own, r5 * own
+        inverse[j, 0], inverse[j, 1], inverse[j, 2] = r0, r1, r2
+        inverse[j, 3], inverse[j, 4], inverse[j, 5] = r3, r4, r5
+        s0, s1, s2 = s0 + height * r0, s1 + height * r1, s2 + height * r2
+        s3, s4, s5 = s3 + height * r3, s4 + height * r4, s5 + height * r5
+        a, b, c = a + r3 * r3, b + r4 * r4, c + r5 * r5
         if j + 1 == TERMS_OF_DEGREE[option]:
+            coefficients[option, 0], coefficients[option, 1], coefficients[option, 2] = s0, s1, s2
+            coefficients[option, 3], coefficients[option, 4], coefficients[option, 5] = s3, s4, s5
             factors[option] = 4.0 * a + 2.0 * b + 4.0 * c
             option += 1
 
@@ -295,7 +297,7 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
     place = np.empty((3, widest))
     rows = np.empty((MONOMIALS + 1, widest + FILLED_UP_TO))
     triangle = np.empty((MONOMIALS + 1, MONOMIALS))
-    coefficients, inverse, variances = np.zeros(MONOMIALS), np.zeros((3, MONOMIALS)), np.zeros(options)
+    coefficients, inverse, variances = np.zeros((options, 6)), np.zeros((MONOMIALS, 6)), np.zeros(options)
     ends = np.zeros(len(sizes), dtype=np.int64)
     for m in range(count):
         e1, e2 = _frame(normals[chosen[m]])
@@ -323,12 +325,11 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
                 if not _determined(triangle, terms, scale / np.sqrt(reach)):
                     continue
                 if not known:
-                    _variances(triangle, terms, inverse, variances)
+                    _solve(triangle, terms, columns, inverse, coefficients, variances)
                     known = True
                 factors[m, s, d] = np.sqrt(variances[d]) / (scale * scale)
-                _solve(triangle, columns, terms, coefficients)
-                _weingarten(coefficients, scale, bends[m] * scale, operators[m, s, d])
-                slopes[m, s, d] = coefficients[1:3]
+                _weingarten(coefficients[d], scale, bends[m] * scale, operators[m, s, d])
+                slopes[m, s, d] = coefficients[d, 1:3]
                 rests[m, s, d] = np.sqrt(over / (last - terms)) * scale
     return operators, factors, rests, slopes
 
