@@ -7,7 +7,6 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from explore3d.bench.apparatus import findings_table as findings_table, write_apparatus as write_apparatus
     from explore3d.bench.curvature import (
-        CURVATURE_SEEDS as CURVATURE_SEEDS,
         CurvatureAccuracy as CurvatureAccuracy,
         CurvatureCell as CurvatureCell,
         available as available,
@@ -53,7 +52,6 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "apparatus": ("findings_table", "write_apparatus"),
     "curvature": (
-        "CURVATURE_SEEDS",
         "CurvatureAccuracy",
         "CurvatureCell",
         "available",

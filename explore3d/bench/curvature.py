@@ -134,9 +134,10 @@ class CurvatureCell:
     by_libigl: float
 
 
-def bench_cells(methods: Iterable[str], seeds: Iterable[int] = CURVATURE_SEEDS) -> Iterator[CurvatureCell]:
-    """Every body, sampling and noise by the methods named."""
-    methods, seeds = list(methods), list(seeds)
+def bench_cells(methods: Iterable[str], count: int = 3, building: bool = False) -> Iterator[CurvatureCell]:
+    """Every body, sampling and noise by the methods named, with so many of the seeds that are reported, or of those
+    that constants may be set with."""
+    methods, seeds = list(methods), (CURVATURE_TUNING_SEEDS if building else CURVATURE_SEEDS)[:count]
     for body, sampling, noise in product(CURVED_BODIES, SAMPLINGS, RELATIVE_NOISES):
         yield from measure_cell(body, sampling, noise, methods, seeds)
 

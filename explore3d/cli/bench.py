@@ -102,6 +102,7 @@ def curvature(
         bool, typer.Option(help="Five bodies, three samplings, four noises: errors, apex and coverage; not the speed.")
     ] = False,
     seeds: Annotated[int, typer.Option(min=1, max=3, help="Seeds of each cell.")] = 3,
+    building: Annotated[bool, typer.Option("--building", help="Cells of seeds that may be looked into.")] = False,
 ) -> None:
     """Error, speed and memory of principal curvatures on bodies that have them in closed form.
 
@@ -113,7 +114,7 @@ def curvature(
     if peers:
         _print(missing)
     if cells:
-        _curvature_cells(["explore3d", "jets alone", *methods[1:]] if peers else methods[:1], seeds, out)
+        _curvature_cells(["explore3d", "jets alone", *methods[1:]] if peers else methods[:1], seeds, building, out)
         return
     sizes = [count for count in (10_000, 100_000, 1_000_000) if count <= largest]
     lines: list[CurvatureAccuracy] = []
@@ -127,13 +128,13 @@ def curvature(
     _print(map(str, write_bench(lines, out)))
 
 
-def _curvature_cells(methods: list[str], seeds: int, out: Path) -> None:
-    from explore3d.bench import CURVATURE_SEEDS, CurvatureCell, bench_cells, cell_table, cell_verdicts, write_cells
+def _curvature_cells(methods: list[str], seeds: int, building: bool, out: Path) -> None:
+    from explore3d.bench import CurvatureCell, bench_cells, cell_table, cell_verdicts, write_cells
 
     lines: list[CurvatureCell] = []
 
     def kept() -> Iterable[CurvatureCell]:
-        for line in bench_cells(methods, CURVATURE_SEEDS[:seeds]):
+        for line in bench_cells(methods, seeds, building):
             lines.append(line)
             yield line
 

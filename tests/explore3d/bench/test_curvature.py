@@ -81,6 +81,16 @@ def test_the_seeds_that_are_reported_are_not_those_of_tuning():
     assert not set(bench.CURVATURE_SEEDS) & set(bench.CURVATURE_TUNING_SEEDS)
 
 
+def test_cells_for_building_have_their_own_seeds(monkeypatch):
+    used = []
+    monkeypatch.setattr(bench, "measure_cell", lambda body, sampling, noise, methods, seeds: used.append(seeds) or [])
+    assert list(bench.bench_cells(["explore3d"], 2)) == []
+    assert set(used) == {bench.CURVATURE_SEEDS[:2]}
+    used.clear()
+    assert list(bench.bench_cells(["explore3d"], 2, building=True)) == []
+    assert set(used) == {bench.CURVATURE_TUNING_SEEDS[:2]}
+
+
 @pytest.mark.slow
 def test_a_cell_compares_all_methods_at_the_same_vertices(tmp_path):
     cells = bench.measure_cell("saddle", "thin", 1e-3, ["explore3d", "jets alone", "libigl, 2 rings"], [1, 5])
