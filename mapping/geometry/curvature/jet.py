@@ -363,13 +363,17 @@ def _patch_normals(surface: Surface) -> FloatArray:
     The area vector of a patch is that of its rim (Stokes): noise of the vertices within cancels. The faces around one
     vertex alone point inward at one vertex of a hundred already where the noise is half an edge long.
     """
-    vectors = surface.face_normals * surface.face_areas[:, None]
-    for _ in range(PATCH_RINGS):
-        total = np.zeros_like(surface.vertices)
-        for corner in range(3):
-            np.add.at(total, surface.faces[:, corner], vectors)
-        vectors = total[surface.faces].sum(axis=1)
-    return total
+    from scipy.sparse import csr_array
+
+    count = len(surface.faces)
+    faces_around = csr_array(
+        (np.ones(3 * count), (surface.faces.ravel(), np.repeat(np.arange(count), 3))),
+        shape=(len(surface.vertices), count),
+    )
+    total = faces_around @ (surface.face_normals * surface.face_areas[:, None])
+    for _ in range(PATCH_RINGS - 1):
+        total = faces_around @ (faces_around.T @ total)
+    return np.asarray(total)
 
 
 def least_alike(normals: FloatArray | None) -> float:
