@@ -69,8 +69,9 @@ def test_a_path_without_noise_is_no_quieter_than_rounding() -> None:
 
     crossings = found(every_other_silent, 0, WIRE).crossings
     assert len(crossings) >= SWEEPS
-    # a crest of 0.1 mm over the rounding of 0.1 nm of all the samples under it
-    assert max(crossing.snr for crossing in crossings) < 1e6 * np.sqrt(2 * np.sqrt(2 * TIP * WIRE) / STEP)
+    # in silent sweeps a crest of 0.1 mm over the rounding of 0.1 nm of all the samples under it
+    silent = [crossing.snr for crossing in crossings if crossing.sweep % 2 == 0]
+    assert len(silent) >= SWEEPS // 2 and max(silent) < 1e6 * np.sqrt(2 * np.sqrt(2 * TIP * WIRE) / STEP)
 
 
 @pytest.mark.filterwarnings("error")
