@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mapping import Feature, FloatArray, Trace
-from mapping.assembly.details import details_of, made_of
+from mapping.assembly.details import along_rested, details_of, made_of
 from mapping.assembly.edges import edge_features, step_features
 from mapping.assembly.faint_features import faint_spacing, why_none_sought, with_faint_lines
 from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
@@ -150,6 +150,7 @@ def _linked(detections: Detections, trace: LaidTrace, inspection: Inspection) ->
     stepped = step_features(steps, _without_shadows(details, tip), around, scale)
     for group in doubtful:
         details += details_of([c for c in group if not on_a_step(c, steps, stepped)], fine)
+    details = along_rested(details, crests, fine)
     return [*_without_shadows(details, tip), *stepped, *edges]
 
 

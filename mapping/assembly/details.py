@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from mapping import Feature, IntArray
-from mapping.assembly.lines import Around, line_features
+from mapping.assembly.lines import Around, line_features, rested_lines
 from mapping.assembly.linking import Inspection, summits
 from mapping.assembly.points import LINE_OVER_SPOT_GAIN, OUTLINE_REACH, outline, point_feature
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import CREST_OUTLIER_SDS, SHAPE_ERROR, crest_trace, robust_cost
-from mapping.inference.kinds import kind_made_of, sizes_of
+from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 
 # A group of crossings that spreads over more than this many half-widths cannot be one round bump: sweeps further
 # than one half-width from its crest miss it. Over 18 simulated plates of braille dots and 8 of lines (below) 2.0, 2.3
@@ -45,6 +45,81 @@ def details_of(members: list[Crossing], around: Around) -> list[Feature]:
         return []
     whole, parted = _undivided(members, around), _of_summits(members, around)
     return parted if parted and _explain_better(parted, whole, members, around) else whole
+
+
+def along_rested(details: Sequence[Feature], crossings: Sequence[Crossing], around: Around) -> list[Feature]:
+    """The details, those that are felt together as the lines that balls may have rested on where these explain the
+    heights better: strokes that bend, or run side by side, nearer to each other than a ball is wide are linked as they
+    are not by crossings that single sweeps show.
+
+    Args:
+        details: that groups of crossings tell.
+        crossings: of the groups.
+        around: the heights of all places, and what they stand on.
+    """
+    kind, told = kind_made_of("convex", line=True), list[Feature]()
+    crests = [c for c in crossings if c.height > 0.0 and not c.is_step]
+    for own, members in _felt_together(details, crests, around.tip_radius):
+        best = own
+        if _may_be_longer(members, around.tip_radius) and _misfit(own, members, around):
+            lines = _along_rested(members, kind.name, around)
+            hollows = [each for each in own if kind_of(each).sign < 0]
+            for other in (lines, [*lines, *hollows]) if lines else ():
+                if _gain(other, best, members, around) > DETAIL_COST * (len(other) - len(best)):
+                    best = other
+        told += best
+    return told
+
+
+def _may_be_longer(members: Sequence[Crossing], tip_radius: float) -> bool:
+    """True of crests that spread farther than one spot reaches."""
+    points, widest = [c.point for c in members], max((abs(c.height) for c in members), default=0.0)
+    return len(members) > 1 and bool(
+        np.linalg.norm(np.ptp(points, axis=0)) > WIDEST_SPOT * np.sqrt(2.0 * tip_radius * widest)
+    )
+
+
+def _along_rested(members: list[Crossing], kind: str, around: Around) -> list[Feature]:
+    """The lines that balls may have rested on, each as its straight strokes where these explain the heights better."""
+    pairs = rested_lines(members, kind, around)
+    told = [bent for bent, _ in pairs]
+    for k, (_, straight) in enumerate(pairs):
+        other = [*told[:k], straight, *told[k + 1 :]]
+        whole, parted = ([feature for each in some for feature in each] for some in (told, other))
+        if straight and _gain(parted, whole, members, around) > DETAIL_COST * (len(parted) - len(whole)):
+            told = other
+    return [feature for each in told for feature in each]
+
+
+def _felt_together(
+    details: Sequence[Feature], crests: Sequence[Crossing], tip_radius: float
+) -> list[tuple[list[Feature], list[Crossing]]]:
+    """Details whose disturbances touch directly or by crests between them, and these crests."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    if not crests:
+        return [([each], []) for each in details]
+    points, reach = (
+        np.array([c.point for c in crests]),
+        np.sqrt(2.0 * tip_radius * np.array([c.height for c in crests])),
+    )
+    one, other = cKDTree(points).query_pairs(2.0 * float(reach.max()), output_type="ndarray").T
+    touch = np.linalg.norm(points[one] - points[other], axis=1) < reach[one] + reach[other]
+    links = [np.stack([one, other])[:, touch]]
+    for k, each in enumerate(details):
+        felt = np.flatnonzero(distances(points, each.axis) < sizes_of(each, tip_radius).half_width + reach)
+        links.append(np.stack([np.full(len(felt), len(crests) + k), felt]))
+    pairs, size = np.concatenate(links, axis=1), len(crests) + len(details)
+    count, label = connected_components(coo_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(size, size)))
+    return [
+        (
+            [each for each, at in zip(details, label[len(crests) :], strict=True) if at == number],
+            [crest for crest, at in zip(crests, label, strict=False) if at == number],
+        )
+        for number in range(count)
+    ]
 
 
 def made_of(crossing: Crossing) -> str:
@@ -106,14 +181,26 @@ def _explain_better(
     One that leaves no more than noise needs no others: of a line that a few sweeps crossed the course is as yet the
     crossings' own, and what it is off by is gained by any parting of it (a wire of nine crossings, one of them 0.4 mm
     aside, left 0.6 of a square a place and was three ridges, which left 0.4).
+    """
+    costs = DETAIL_COST * (len(parted) - len(whole))
+    return _misfit(whole, members, around) and _gain(parted, whole, members, around) > costs
+
+
+def _misfit(details: Sequence[Feature], members: list[Crossing], around: Around) -> bool:
+    """True if details leave more than noise at the places about a group."""
+    near = _near(members, around)
+    return _left_over(details, near, members, around) > len(near)
+
+
+def _gain(parted: Sequence[Feature], whole: Sequence[Feature], members: list[Crossing], around: Around) -> float:
+    """By how much more some details explain the heights about a group than others do, in squares of the noise.
 
     What is left over by the better of the two as well, as where other details are felt, speaks for neither: the gain is
     divided by it (a quasi-likelihood; Wedderburn, Biometrika 61, 1974).
     """
     near = _near(members, around)
     before, after = (_left_over(details, near, members, around) for details in (whole, parted))
-    misfit = max(1.0, min(before, after) / len(near))
-    return before > len(near) and (before - after) / misfit > DETAIL_COST * (len(parted) - len(whole))
+    return (before - after) / max(1.0, min(before, after) / len(near))
 
 
 def _left_over(details: Sequence[Feature], near: IntArray, members: list[Crossing], around: Around) -> float:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -11,14 +13,18 @@ from mapping import Feature, FloatArray, Interval
 from mapping.assembly.linking import (
     FELT_REACH,
     LONGEST_LINK,
+    ONE_PLACE,
     Branch,
     Inspection,
     between,
     branches,
     closes,
     ended_length,
+    joined,
     line_end,
     rejoined,
+    rested_on,
+    strokes,
 )
 from mapping.assembly.points import body_width, evidence
 from mapping.assembly.runs import RunPoint
@@ -37,6 +43,9 @@ ONE_POINT = 0.5
 SLANTED_WIDTH_RATIO = 2.0
 # A link over a place that felt no crest is as good as one so many times as long.
 DENIED = 3.0
+
+# Whether an axis (K, 3) of a height and a half-width (m) returns to its beginning
+Closes = Callable[[FloatArray, float, float], bool]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +70,86 @@ def line_features(members: list[Crossing], kind: str, around: Around) -> list[Fe
     links = _links(points, members[0].height, half_width, around)
     lines = branches(points, half_width, links)
     lines = rejoined(lines, half_width, partial(_denied, members[0].height, half_width, around))
+    return _features_along(lines, [], members, kind, around, partial(closes, inspection=around.inspection))
+
+
+def rested_lines(members: list[Crossing], kind: str, around: Around) -> list[tuple[list[Feature], list[Feature]]]:
+    """The smooth lines through all places about a group's crossings that a ball may have rested on, and the straight
+    strokes that each may be instead, none of most.
+
+    What tells a place from one beside it is finer than a disturbance, by which lines are told where single sweeps
+    alone say where they are.
+    """
+    top = float(np.quantile([abs(c.height) for c in members], 0.8))
+    half_width = float(np.sqrt(2 * around.tip_radius * top))
+    apart = ONE_PLACE * half_width
+    places = around.inspection.near(np.array([c.point for c in members]), half_width)
+    points = rested_on(places, around.inspection, around.tip_radius, half_width)
+    if len(points) < 2:
+        return []
+    lines = _uncut(branches(points, apart), 3.0 * apart)
+    told = []
+    for line in lines:
+        beside = [other for other in lines if other is not line]
+        bent, straight = (
+            _features_along(own, beside, members, kind, around, _known_to_return, apart)
+            for own in ([line], strokes(line, 0.5 * apart, half_width))
+        )
+        told.append((bent, straight))
+    return told
+
+
+def _known_to_return(axis: FloatArray, height: float, half_width: float) -> bool:
+    """False: what is closed is known to be beforehand."""
+    return False
+
+
+def _uncut(lines: list[Branch], gap: float) -> list[Branch]:
+    """The lines without the cuts of a tree, which has no rings: free ends that are no farther apart than places of one
+    course that have none between them, m: two, and half of one more to either side, as places are means."""
+    lines = list(lines)
+    while True:
+        ends = [(k, e) for k, line in enumerate(lines) if not line.closed for e in (0, 1) if line.free[e]]
+        pairs = [
+            (float(np.linalg.norm(lines[a].axis[-e] - lines[b].axis[-f])), (a, e), (b, f))
+            for (a, e), (b, f) in itertools.combinations(ends, 2)
+            if a != b or len(lines[a].axis) > 3
+        ]
+        apart, one, other = min(pairs, default=(np.inf, (0, 0), (0, 0)))
+        if apart > gap:
+            return lines
+        whole = replace(lines[one[0]], closed=True) if one[0] == other[0] else joined(lines, one, other)
+        lines = [*(line for k, line in enumerate(lines) if k not in (one[0], other[0])), whole]
+
+
+def _features_along(
+    lines: list[Branch],
+    beside: list[Branch],
+    members: list[Crossing],
+    kind: str,
+    around: Around,
+    closes: Closes,
+    longest: float = np.inf,
+) -> list[Feature]:
+    """A feature of each line, of the crossings that lie nearest to it, or of the nearest.
+
+    Args:
+        lines: of one point they are none.
+        beside: others, which crossings may be of.
+        members: all crossings.
+        kind: of the features.
+        around: what they are judged by.
+        closes: whether one both of whose ends are free is closed.
+        longest: distance beyond its last point up to which a line may go on, m.
+    """
     # a lone point that is left between two meeting places is no line
     lines = [branch for branch in lines if len(branch.axis) > 1]
     features = []
     for branch in lines:
-        others = [other.axis for other in lines if other is not branch]
+        others = [other.axis for other in (*lines, *beside) if other is not branch]
         own = [c for c in members if _nearest(c.point, branch.axis, others)]
-        features.append(_line_feature(branch, own, kind, around))
+        own = own or [min(members, key=lambda c: float(distances(c.point[None], branch.axis)[0]))]
+        features.append(_line_feature(branch, own, kind, around, closes, longest))
     return features
 
 
@@ -138,15 +220,22 @@ def mean_point(cluster: list[Crossing]) -> FloatArray:
     return np.asarray(weights @ np.array([c.point for c in cluster]) / weights.sum())
 
 
-def _line_feature(branch: Branch, members: list[Crossing], kind: str, around: Around) -> Feature:
+def _line_feature(
+    branch: Branch,
+    members: list[Crossing],
+    kind: str,
+    around: Around,
+    closes: Closes,
+    longest: float,
+) -> Feature:
     axis = branch.axis
     height, half_width, sd = _section(axis, members, around)
     notes: tuple[str, ...] = ("junction",) if branch.junction else ()
-    if branch.closed or (branch.free == (True, True) and closes(axis, height, half_width, around.inspection)):
+    if branch.closed or (branch.free == (True, True) and closes(axis, height, half_width)):
         axis = np.vstack([axis, axis[:1]])
         length = _exactly(axis)
     else:
-        axis, length = _ended(branch, height, half_width, members, around)
+        axis, length = _ended(branch, height, half_width, members, around, longest)
         if length.censored:
             notes += ("runs on where nothing was inspected: its length is at least this",)
     # lowered onto the base, not along one crossing's normal: a line that bends over the base has many
@@ -195,11 +284,11 @@ def _section(axis: FloatArray, members: list[Crossing], around: Around) -> tuple
 
 
 def _ended(
-    branch: Branch, height: float, half_width: float, members: list[Crossing], around: Around
+    branch: Branch, height: float, half_width: float, members: list[Crossing], around: Around, longest: float
 ) -> tuple[FloatArray, Interval]:
     """The axis up to its ends, and its length: at least so much where an end was not seen."""
     axis, ends = branch.axis, []
-    longest = 3 * half_width + 2 * min(around.inspection.pitch, 3 * half_width)
+    longest = min(longest, 3 * half_width + 2 * min(around.inspection.pitch, 3 * half_width))
     for free in branch.free[::-1]:
         if free:
             axis = _without_low_end(axis, members, half_width)

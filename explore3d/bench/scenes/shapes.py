@@ -198,7 +198,7 @@ def felt_shape(name: str, seed: int) -> FeltShape:
     courses = tuple(axis - lifted * _normals(shape.above, axis, lifted) for axis in axes)
     if shape.kind == "ridge":
         return FeltShape(shape, courses, 2.0 * radius, (2.0 * radius, 2.0 * radius), trace)
-    return FeltShape(shape, courses, radius, (np.sqrt(3.0) * radius, 2.0 * radius), trace)
+    return FeltShape(shape, courses, radius, (float(np.sqrt(3.0)) * radius, 2.0 * radius), trace)
 
 
 def _placed(shape: Shape, rng: np.random.Generator) -> tuple[float, FloatArray]:

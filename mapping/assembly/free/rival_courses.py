@@ -16,7 +16,7 @@ from mapping import Feature, FloatArray
 from mapping.assembly.free.section import CORE
 from mapping.assembly.linking import Inspection
 from mapping.geometry.mesh import distances, nearest_on, resample
-from mapping.inference.joint import gaps
+from mapping.inference.joint import felt_together, gaps
 from mapping.inference.kinds import kind_of, sizes_of
 
 # Numbers that say where a feature is: a spot's two; a line's two ends, and one for how it bends between them
@@ -36,7 +36,8 @@ def outweighed(
         tip: radius, m.
     """
     features, lost = [*wide, *beside], [False] * len(wide)
-    for group in _felt_together([*features, *rivals], tip):
+    both = [*features, *rivals]
+    for group in felt_together(gaps(both, [sizes_of(feature, tip).half_width for feature in both])):
         asked = [k for k in group if k < len(wide)]
         ours = [features[k] for k in group if k < len(features)]
         theirs = [rivals[k - len(features)] for k in group if k >= len(features)]
@@ -68,16 +69,6 @@ def _runs_along(feature: Feature, others: Sequence[Feature], aside: float, beyon
         ended = (nearest[:, None] == ends[None]).all(axis=2).any(axis=1)
         near |= away < np.where(ended, beyond, aside)
     return bool(near.all())
-
-
-def _felt_together(features: Sequence[Feature], tip: float) -> list[list[int]]:
-    """Indices of features whose disturbances touch, directly or by those of others."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
-    touching = gaps(features, [sizes_of(feature, tip).half_width for feature in features]) < 0.0
-    count, label = connected_components(csr_array(touching.astype(np.float64)), directed=False)
-    return [[int(k) for k in np.flatnonzero(label == number)] for number in range(count)]
 
 
 def _log_ratio(rivals: Sequence[Feature], features: Sequence[Feature], inspection: Inspection, tip: float) -> float:

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from mapping.assembly.linking.branches import (
         Branch as Branch,
         branches as branches,
+        joined as joined,
         main_line as main_line,
         rejoined as rejoined,
     )
@@ -26,13 +27,17 @@ if TYPE_CHECKING:
         groups as groups,
         uphill as uphill,
     )
+    from mapping.assembly.linking.rested_on import ONE_PLACE as ONE_PLACE, rested_on as rested_on
+    from mapping.assembly.linking.strokes import strokes as strokes
     from mapping.assembly.linking.summits import summits as summits
 
 _PUBLIC = {
-    "branches": ("Branch", "branches", "main_line", "rejoined"),
+    "branches": ("Branch", "branches", "joined", "main_line", "rejoined"),
     "inspection": ("Inspection", "Inspections"),
     "line_ends": ("LineEnd", "closes", "ended_length", "line_end"),
     "linking": ("FELT_REACH", "HEIGHT_RATIO", "LONGEST_LINK", "between", "groups", "uphill"),
+    "rested_on": ("ONE_PLACE", "rested_on"),
+    "strokes": ("strokes",),
     "summits": ("summits",),
 }
 doorway(__name__, _PUBLIC)

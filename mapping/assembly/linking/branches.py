@@ -224,7 +224,7 @@ def _meetings(
             crowded.add(number)
         elif len(own) == 2 and own[0] not in partner and own[1] not in partner:
             partner[own[0]], partner[own[1]] = own[1], own[0]
-        meeting.append(_nearest_to_lines([seen[end] for end in own], center, half_width))
+        meeting.append(nearest_to_lines([seen[end] for end in own], center, half_width))
     return meeting, partner, crowded
 
 
@@ -246,7 +246,7 @@ def _straight_pairs(
     return pairs
 
 
-def _nearest_to_lines(lines: list[tuple[FloatArray, FloatArray]], center: FloatArray, half_width: float) -> FloatArray:
+def nearest_to_lines(lines: list[tuple[FloatArray, FloatArray]], center: FloatArray, half_width: float) -> FloatArray:
     """The point that is nearest to all lines (point, direction), held to the neighbourhood of the centre."""
     weak = 1e-3
     left, right = weak * np.eye(3), weak * center
@@ -306,12 +306,16 @@ def rejoined(lines: list[Branch], half_width: float, denied: Callable[[FloatArra
     """
     lines = list(lines)
     while (pair := _straightest(lines, half_width, denied)) is not None:
-        (a, e), (b, f) = pair
-        first, second = _turned(lines[a], 1 - e), _turned(lines[b], f)
-        axis = np.concatenate([first.axis, second.axis])
-        whole = Branch(axis, (first.free[0], second.free[1]), first.junction or second.junction)
-        lines = [line for k, line in enumerate(lines) if k not in (a, b)] + [whole]
+        whole = joined(lines, *pair)
+        lines = [line for k, line in enumerate(lines) if k not in (pair[0][0], pair[1][0])] + [whole]
     return lines
+
+
+def joined(lines: list[Branch], one: FreeEnd, other: FreeEnd) -> Branch:
+    """Two of some lines as one, from an end of the first to one of the second: their numbers, and 0 or 1 for each."""
+    first, second = _turned(lines[one[0]], 1 - one[1]), _turned(lines[other[0]], other[1])
+    axis = np.concatenate([first.axis, second.axis])
+    return Branch(axis, (first.free[0], second.free[1]), first.junction or second.junction)
 
 
 def _turned(line: Branch, turn: int) -> Branch:

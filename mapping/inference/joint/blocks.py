@@ -22,6 +22,15 @@ def gaps(features: Sequence[Feature], reach: Sequence[float]) -> FloatArray:
     return np.asarray(np.minimum(apart, apart.T) - np.add.outer(reach, reach))
 
 
+def felt_together(gap: FloatArray) -> list[list[int]]:
+    """Numbers of what touches, directly or by others between (N, N) gaps, m."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    count, label = connected_components(csr_array((gap < 0.0).astype(np.float64)), directed=False)
+    return [[int(k) for k in np.flatnonzero(label == number)] for number in range(count)]
+
+
 def blocks_of(gap: FloatArray, order: Sequence[int], most: int) -> list[list[int]]:
     """Numbers cut into blocks: each grows from the first one left by whatever is nearest to it and touches it.
 
