@@ -48,9 +48,11 @@ def details_of(members: list[Crossing], around: Around) -> list[Feature]:
 
 
 def along_rested(details: Sequence[Feature], crossings: Sequence[Crossing], around: Around) -> list[Feature]:
-    """The details, those that are felt together as the lines that balls may have rested on where these explain the
-    heights better: strokes that bend, or run side by side, nearer to each other than a ball is wide are linked as they
-    are not by crossings that single sweeps show.
+    """The details, those that are felt together as the lines that balls may have rested on where these leave no more
+    than noise, and the details do.
+
+    Strokes that bend, or run side by side, nearer to each other than a ball is wide are linked as they are not by
+    crossings that single sweeps show.
 
     Args:
         details: that groups of crossings tell.
@@ -61,12 +63,14 @@ def along_rested(details: Sequence[Feature], crossings: Sequence[Crossing], arou
     crests = [c for c in crossings if c.height > 0.0 and not c.is_step]
     for own, members in _felt_together(details, crests, around.tip_radius):
         best = own
-        if _may_be_longer(members, around.tip_radius) and _misfit(own, members, around):
+        stands = any(kind_of(each).sign > 0 for each in own)
+        if stands and _may_be_longer(members, around.tip_radius) and _misfit(own, members, around):
             lines = _along_rested(members, kind.name, around)
             hollows = [each for each in own if kind_of(each).sign < 0]
-            for other in (lines, [*lines, *hollows]) if lines else ():
-                if _gain(other, best, members, around) > DETAIL_COST * (len(other) - len(best)):
+            for other in (lines, [*lines, *hollows]):
+                if not _misfit(other, members, around):
                     best = other
+                    break
         told += best
     return told
 
