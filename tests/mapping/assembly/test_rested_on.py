@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy.spatial import cKDTree
 
 from explore3d.bench.scenes import FIRST_BUILT_WITH, FeltShape, felt_shape
 from mapping import Feature
 from mapping.assembly import assemble
-from mapping.assembly.linking import Branch, strokes
+from mapping.assembly.linking import Branch, Inspection, rested_on, strokes
 from mapping.base import fit_base
 from mapping.detection import detect
 from mapping.geometry.mesh import distances
@@ -28,6 +29,22 @@ def off(features: list[Feature], felt: FeltShape) -> float:
     return max(float(cKDTree(course).query(dense)[0].max()), float(np.quantile(from_axes, 0.95)))
 
 
+def test_places_that_balls_may_have_rested_on_lie_along_a_bend_of_any_radius() -> None:
+    tip, height, turn = 10e-3, 0.65e-3, np.linspace(0.0, 1.5 * np.pi, 200)
+    course = 3e-3 * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(200)])
+    along, aside = np.arange(-9e-3, 9e-3, 0.7e-3), np.arange(-9e-3, 9e-3, 2e-3)
+    rows = np.array([[x, y, 0.0] for y in aside for x in along] + [[y, x, 0.0] for y in aside for x in along])
+    felt = np.maximum(height - cKDTree(course).query(rows)[0] ** 2 / (2.0 * tip), 0.0)
+    sweep = np.repeat(np.arange(2 * len(aside)), len(along))
+    up = np.tile([0.0, 0.0, 1.0], (len(rows), 1))
+    inspection = Inspection(rows, felt, np.full(len(rows), 1e-6), sweep, 0.7e-3, up)
+    half_width = float(np.sqrt(2.0 * tip * height))
+    found = rested_on(np.arange(len(rows)), inspection, tip, half_width)
+    assert cKDTree(course).query(found)[0].max() < 0.5e-3
+    assert cKDTree(found).query(course)[0].max() < 1.2e-3
+
+
+@pytest.mark.slow
 def test_an_s_that_bends_within_the_balls_reach_is_one_ridge_along_it() -> None:
     felt = felt_shape("S 3 mm", FIRST_BUILT_WITH)
     (ridge,) = told(felt)
@@ -35,6 +52,7 @@ def test_an_s_that_bends_within_the_balls_reach_is_one_ridge_along_it() -> None:
     assert off([ridge], felt) < 0.5e-3
 
 
+@pytest.mark.slow
 def test_the_bar_of_a_letter_is_a_ridge_and_its_legs_meet_in_a_corner() -> None:
     felt = felt_shape("A", FIRST_BUILT_WITH)
     found = told(felt)
