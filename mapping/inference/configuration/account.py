@@ -186,6 +186,11 @@ def _laid_out(features: Sequence[Feature], place: Neighbourhood) -> tuple[list[P
     parts = [_begun(feature, place) for feature in features]
     start = fitted(parts, place)
     assert start is not None
+    resting = [on_its_floor(part, place) for part in parts] if not start.fits else parts
+    if any(new is not old for new, old in zip(resting, parts, strict=True)):
+        other = fitted(resting, place)
+        if other is not None and other.log_odds > start.log_odds:
+            return resting, other
     return parts, start
 
 
@@ -241,7 +246,7 @@ def _explains(best: Configuration, spot: Feature) -> bool:
 
 def _begun(feature: Feature, place: Neighbourhood) -> Part:
     """The part of a feature, in the family that it was proposed in."""
-    part, top = on_its_floor(part_of(feature, place), place), feature.details.top
+    part, top = part_of(feature, place), feature.details.top
     return as_bar(part, place, top) if top and isinstance(part.shape, RidgeShape) else part
 
 
