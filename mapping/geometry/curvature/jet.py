@@ -30,7 +30,7 @@ WEIGHT_EXPONENT = 0.75
 SAMPLE = 3000
 # Ordinates are bent by what was found over planes on so many points, and then once more by what was found so on the
 # sample. On spheres with noise the second time halves the errors of the bend, and with them those of the widest fits; a
-# third changes nothing.
+# third changes nothing. With 300 and 3000 first ones medians of four cells (building seed) are within 1 % of these.
 FIRST_BENDS = 1000
 # Without noise a bend is as exact as the fits that it is found with: as long as the last made the stated errors smaller
 # by this factor, another one follows. Noise and what no bend straightens let the second make them smaller by 4 at most.
