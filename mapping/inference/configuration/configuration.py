@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mapping import Feature, FloatArray, Interval
+from mapping import Feature, FloatArray, Interval, MappingError
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import crest_trace
 from mapping.inference.configuration.common_deviation import Deviation, Fitted, common_deviation
@@ -48,7 +48,7 @@ NO_HEIGHT = 1e-12
 # The level of misfit is chosen again where the optimum under the first one says another
 MOST_LEVEL_CHANGES = 3
 # Half-widths beside the axis of a groove within which the ball is about as deep as on it: where it hangs between two
-# rims it is 1 - (1 - 0.25)^2 = 0.44 of the depth higher at the border of that, a fifth in the median
+# rims it is 1 - (1 - 0.25)^2 = 0.44 of the depth higher at the border of that, 0.23 in the median
 ON_AXIS = 0.25
 
 
@@ -235,7 +235,10 @@ def on_its_floor(part: Part, place: Neighbourhood) -> Part:
     deep = near & (window.height < -0.5 * depth)
     width = 2.0 * (float(aside[deep].max(initial=0.0)) + float(np.sqrt(tip * depth - 0.25 * depth**2)))
     felt = replace(feature, height=about(-depth), width=Interval(width, 0.5 * width, 2.0 * width))
-    wide = part_of(felt, place)
+    try:
+        wide = part_of(felt, place)
+    except MappingError:  # the base does not go on so far beside its axis: it stays as it was told
+        return part
     wide = replace(wide, start=np.array([*wide.start[:-2], np.log(width), np.log(depth)]))
     log = [
         float(LogPosterior(place.joined([each.shape]), place.levels[-1][0]).log_density(each.start[None])[0])
