@@ -108,6 +108,8 @@ def curvature(
 
     Example: explore3d bench curvature --largest 1000000 --out out/curvature
     """
+    if building and not cells:
+        raise UserError("--building: names the seeds of cells; add --cells, or leave it out")
     from explore3d.bench import CurvatureAccuracy, available, bench_curvature, curvature_table, write_bench
 
     methods, missing = available()

@@ -250,6 +250,7 @@ def test_a_bad_log_ends_in_one_line_and_leaves_no_folder(
     ("arguments", "message"),
     [
         (["bench", "trace", "--triangles", "many"], "--triangles: expected whole numbers"),
+        (["bench", "curvature", "--building"], "--building: names the seeds of cells; add --cells"),
         (["bench", "explore", "--store", "s.jsonl", "--scenes", "moon"], "--scenes: unknown 'moon'; possible: "),
         (["bench", "calibration", "--store", "s.jsonl", "--method", "luck"], "--method: expected importance or emcee"),
         (["merge", "absent", "log.mcap", "--out", "m"], "absent"),
