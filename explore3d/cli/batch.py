@@ -163,7 +163,8 @@ class _Lines:
         if not standing.of:
             return
         if standing.done == standing.of or monotonic() - self._last >= LINE_EVERY:
-            print(f"{standing.done} of {standing.of} logs{_rest(standing)}", file=sys.stderr, flush=True)
+            # in one piece, as a stage's name is (see progress)
+            print(f"{standing.done} of {standing.of} logs{_rest(standing)}\n", end="", file=sys.stderr, flush=True)
             self._last = monotonic()
 
 

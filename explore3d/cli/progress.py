@@ -53,5 +53,6 @@ class _Lines:
 
     def __call__(self, stage: str, share: float) -> None:
         if stage != self._stage:
-            print(stage, file=sys.stderr, flush=True)
+            # in one piece: a signal between a word and the end of its line would glue what is said of it to the word
+            print(f"{stage}\n", end="", file=sys.stderr, flush=True)
             self._stage = stage

@@ -23,6 +23,14 @@ def test_a_log_file_gets_one_line_a_stage(capsys: pytest.CaptureFixture[str]) ->
     assert captured.out == ""
 
 
+def test_no_signal_comes_between_a_stage_and_the_end_of_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is said of the signal would be glued to the stage's name."""
+    written = list[str]()
+    monkeypatch.setattr(sys.stderr, "write", lambda text: written.append(text) or len(text))
+    work()
+    assert [text for text in written if text] == ["survey\n", "posterior\n"]
+
+
 def test_a_quiet_job_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     work(quiet=True)
     captured = capsys.readouterr()
