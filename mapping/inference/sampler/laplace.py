@@ -176,13 +176,13 @@ def _descend(
         scaled = scaled * ~(((theta <= low) & (outwards > 0.0)) | ((theta >= high) & (outwards < 0.0)))
         gradient, hessian = scaled.T @ residual, scaled.T @ scaled
         if turn >= LEARNING and cost > most:
-            promised = float(gradient @ np.linalg.solve(hessian + prior, gradient))
+            promised = float(gradient @ shortest_solution(hessian + prior, gradient))
             if cost - PROMISES * promised > most:
                 return None
         # Several dampings are tried at once: a batch of templates costs little more than one.
         dampings = damping * np.array([1e-2, 1.0, 1e2, 1e4])
         ridge = np.maximum(np.diag(hessian), 1e-6 * max(float(np.diag(hessian).max()), 1e-300))
-        moves = np.stack([np.linalg.solve(hessian + prior + d * np.diag(ridge), -gradient) for d in dampings])
+        moves = np.stack([shortest_solution(hessian + prior + d * np.diag(ridge), -gradient) for d in dampings])
         candidates = np.clip(theta + moves * scale, low, high)
         residuals = target.residuals(candidates)
         costs = (residuals**2).sum(axis=1)
@@ -207,6 +207,16 @@ def _descend(
         sure = settled
         jacobian = _central(target, theta, 0.1 * scale)[1] if sure else _ahead(target, theta, residual, 0.1 * scale)
     return np.asarray(theta), cost
+
+
+def shortest_solution(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """The shortest of all solutions (P,) of the least squares of a matrix (P, P) whose diagonal is positive.
+
+    Two shapes that lie one on the other, as where a search begins, leave a matrix that is singular to rounding: what
+    they differ by changes nothing, and stays.
+    """
+    unit = 1.0 / np.sqrt(np.diag(matrix))
+    return np.asarray(unit * np.linalg.lstsq(matrix * np.outer(unit, unit), unit * right)[0])
 
 
 def _ahead(target: LogPosterior, theta: FloatArray, residual: FloatArray, step: FloatArray) -> FloatArray:

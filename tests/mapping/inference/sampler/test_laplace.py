@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mapping import FloatArray
-from mapping.inference.sampler.laplace import find_optima
+from mapping.inference.sampler.laplace import find_optima, shortest_solution
 
 # Of chi-square this much is left wherever a search goes
 LEFT = 900.0
@@ -71,3 +71,10 @@ def test_where_one_start_is_of_use_no_other_is_given_up() -> None:
     found = find_optima(both, np.array([far, near]), most=10.0)
     np.testing.assert_array_equal(found, find_optima(unhurried, np.array([far, near])))
     assert both.asked > unhurried.asked
+
+
+def test_two_shapes_that_lie_one_on_the_other_share_what_they_explain() -> None:
+    sharp = 1e18 * np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1e-30]])  # singular, and one hardly felt
+    np.testing.assert_allclose(shortest_solution(sharp, np.array([1e18, 1e18, 3e-12])), [0.5, 0.5, 3.0], rtol=1e-9)
+    plain = np.array([[4.0, 1.0], [1.0, 3.0]])
+    np.testing.assert_allclose(plain @ shortest_solution(plain, np.array([1.0, 2.0])), [1.0, 2.0], rtol=1e-12)
