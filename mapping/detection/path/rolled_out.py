@@ -38,6 +38,7 @@ class RolledOut:
         places: (K, 3) the same places on the base's own trace, m.
         height: (K,) over the base, m.
         span: blocks over which a direction is taken.
+        round: (K,) angle by which the base's normal has turned forwards since the beginning, rad: 2 pi once round.
     """
 
     first: IntArray
@@ -46,6 +47,7 @@ class RolledOut:
     places: FloatArray
     height: FloatArray
     span: int
+    round: FloatArray
 
     def turns(self, span: int) -> tuple[FloatArray, FloatArray]:
         """At each place (K,): change of the chord of unit length over `span` places, and angle of its turn, rad.
@@ -148,7 +150,8 @@ def rolled_out(
         moves = ~_waits(places, span, size * step)
         if moves.sum() < 3:
             return None
-        path = RolledOut(first[moves], size, _plane(places[moves], normals[moves]), places[moves], height[moves], span)
+        own, up = places[moves], normals[moves]
+        path = RolledOut(first[moves], size, _plane(own, up), own, height[moves], span, _round(own, up))
         if size == span == 1 or CERTAIN_TURN_SDS * path.turn_sd() < sharp or len(places) < 8 * span:
             return path
         places, normals, height = _halved(places), _halved(normals), _halved(height)
@@ -198,6 +201,14 @@ def _plane(places: FloatArray, normals: FloatArray) -> ComplexArray:
     turn = np.einsum("ij,ij->i", before, carried) + 1j * np.einsum("ij,ij->i", n, np.cross(before, carried))
     direction = np.concatenate([[0.0], np.cumsum(np.angle(turn))])
     return np.concatenate([[0.0], np.cumsum(length * np.exp(1j * direction))])
+
+
+def _round(places: FloatArray, normals: FloatArray) -> FloatArray:
+    """Angles (K,) by which the normals (K, 3) have turned the way that the places (K, 3) advance."""
+    along = np.diff(places, axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(float).tiny)
+    chord = np.einsum("ij,ij->i", np.diff(normals, axis=0), along)
+    return np.concatenate([[0.0], np.cumsum(2.0 * np.arcsin(np.clip(0.5 * chord, -1.0, 1.0)))])
 
 
 def _median_distance(centers: FloatArray, k: int) -> float:

@@ -118,10 +118,11 @@ def _cuts(sweep: LaidSweep, step: float, reach: float, reasons: Counter[str]) ->
         # round a plate's border, or round a wire's end: a circuit has corners, and is one sweep
         corners = [] if _is_circuit(path, 0, len(path.plane) - 1) else _corners(path)
         bends = _bends(path, corners)
+        rounds = _rounds(path, sorted({*corners, *bends}))
         reasons.update({"turn": len(corners)} if corners else {})
-        reasons.update({"beside itself": len(bends)} if bends else {})
+        reasons.update({"beside itself": len(bends) + len(rounds)} if bends or rounds else {})
         # a block's mean lies in its middle
-        cuts += [begin + int(path.first[k]) + path.size // 2 for k in sorted({*corners, *bends})]
+        cuts += [begin + int(path.first[k]) + path.size // 2 for k in sorted({*corners, *bends, *rounds})]
     return cuts
 
 
@@ -180,10 +181,7 @@ def _bends(path: RolledOut, corners: list[int]) -> list[int]:
 
     It is cut in the half of the allowed range that comes last, where the heights are flattest: not on a crest.
     """
-    span = path.span
-    # of each direction the middle of its chord, and how far the path there is off the base
-    sums = np.concatenate([[0.0], np.cumsum(np.abs(path.height - np.median(path.height)))])
-    rough = (sums[span + 1 :] - sums[: -span - 1]) / (span + 1)
+    span, rough = path.span, _rough(path)
     cuts: list[int] = []
     for begin, end in zip([0, *corners], [*corners, len(path.plane) - 1], strict=True):
         if end - begin < 3 * span + 2:
@@ -197,6 +195,36 @@ def _bends(path: RolledOut, corners: list[int]) -> list[int]:
             here = first + int(np.argmin(rough[begin + first : begin + last + 1]))
             cuts.append(begin + here + span // 2)
     return cuts
+
+
+def _rough(path: RolledOut) -> FloatArray:
+    """(K - span,) how far the path is off the base over each chord."""
+    sums = np.concatenate([[0.0], np.cumsum(np.abs(path.height - np.median(path.height)))])
+    return np.asarray((sums[path.span + 1 :] - sums[: -path.span - 1]) / (path.span + 1))
+
+
+def _rounds(path: RolledOut, cuts: list[int]) -> list[int]:
+    """Places where a path that winds round the body, straight on, would come beside itself.
+
+    Nothing turns in the plane that it is rolled out into: the base's normal does. Once round, and a quarter, stays
+    whole. It is cut in the second half of a round, where the heights are flattest.
+    """
+    span, rough = path.span, _rough(path)
+    rounds: list[int] = []
+    for begin, end in zip([0, *cuts], [*cuts, len(path.plane) - 1], strict=True):
+        if np.ptp(path.round[begin : end + 1]) <= ONCE_ROUND[1]:
+            continue
+        here = begin
+        while True:
+            turned = np.maximum.accumulate(np.abs(path.round[here : end + 1] - path.round[here]))
+            if turned[-1] <= 2.0 * np.pi:
+                break
+            first, last = (here + int(k) for k in np.searchsorted(turned, [np.pi, 2.0 * np.pi]))
+            # the chord about a place begins half a span before it
+            low, high = max(first - span // 2, 0), max(last - span // 2, 1)
+            here = max(low + int(np.argmin(rough[low:high])) + span // 2, here + 1)
+            rounds.append(here)
+    return rounds
 
 
 def _beyond(direction: FloatArray, here: int) -> tuple[int, int] | None:

@@ -10,10 +10,12 @@ import pytest
 from explore3d.bench.scenes import TIP_RADIUS, plate, wire
 from mapping import Feature, FloatArray, IntArray, Trace
 from mapping.assembly import assemble
+from mapping.base import fit_base
 from mapping.detection import detect
 from mapping.detection.path import PathLedger, path_ledger, sound_sweeps
 from mapping.geometry.templates import step_height
 
+ROUND = 2.0 * np.pi + 0.1
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -256,3 +258,20 @@ def test_readings_that_were_not_felt_have_their_own_reason() -> None:
     before = dict(path_ledger(sound, detect(kept, plate())).left_out)
     (ends,) = (length for reason, length in before.items() if "ends of sweeps" in reason)
     assert left_out.get("ends of sweeps, and pieces too short for the smallest crest", 0.0) < 0.2 * ends
+
+
+def test_a_helix_about_a_body_is_cut_once_a_round_where_nothing_was_felt() -> None:
+    radius, angle = 20e-3, np.arange(0.0, 8.0 * np.pi, 2e-3)
+    away = np.abs(np.angle(np.exp(1j * (angle - 1.3)))) * radius
+    out = radius + np.sqrt(np.maximum((2e-3 + 0.1e-3) ** 2 - away**2, 2e-3**2))  # over a wire along the axis
+    out += 1e-6 * np.random.default_rng(3).standard_normal(len(angle))
+    centers = np.column_stack([out * np.cos(angle), out * np.sin(angle), 2e-3 * angle / (2 * np.pi)])
+    trace = Trace(2e-4 * np.arange(float(len(angle))), centers, np.zeros(len(angle)), 2e-3)
+    base = fit_base(trace)
+    assert base.kind == "cylinder"
+    once = trace.select(slice(0, int(2.2 * np.pi / 2e-3)))
+    assert sound_sweeps(once, base).cuts == ()
+    begins = np.flatnonzero(np.diff(sound_sweeps(trace, base).trace.sweep)) + 1
+    assert 3 <= len(begins) <= 7
+    assert (np.diff(angle[[0, *begins, -1]]) < ROUND).all()
+    assert (away[begins] > 1e-3).all()
