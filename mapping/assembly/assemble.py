@@ -12,7 +12,7 @@ from mapping.assembly.details import along_rested, details_of, made_of
 from mapping.assembly.edges import edge_features, step_features
 from mapping.assembly.faint_features import faint_spacing, why_none_sought, with_faint_lines
 from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
-from mapping.assembly.free import free_sections, free_spot, outweighed
+from mapping.assembly.free import free_sections, free_spot, outweighed, round_lines
 from mapping.assembly.free_lines import free_lines, lies_on
 from mapping.assembly.lines import Around
 from mapping.assembly.linking import Inspection, Inspections, groups
@@ -71,17 +71,20 @@ def assemble(
         return _of_profile(detections, laid)
     inspections = inspections or inspected_for(detections, laid, base, spacing=spacing, faint=faint)
     spacing = place_spacing(crossings, trace.tip_radius) if spacing is None and crossings else spacing
-    wide, flat = list[Feature](), list[Feature]()
+    wide, flat, round_it = list[Feature](), list[Feature](), list[Feature]()
     if spacing is not None and crossings:
         plain = Around(inspections.at(spacing), base, detections, trace.tip_radius)
         flat, crossings = plateau_features(crossings, plain)
+        detections = replace(detections, crossings=crossings)
+        round_it, crossings = round_lines(detections, plain.inspection.over_terraces, trace.tip_radius)
         detections = replace(detections, crossings=crossings)
     if base.kind != "mesh":  # a given base that is off is no detail, however wide
         sections, upon, rest = free_sections(detections, laid)
         sections = [section for section in sections if not any(lies_on(section.crossing, each) for each in flat)]
         wide, slanted = free_lines(sections, detections, laid)
-        fine = [*rest, *upon, *(crossing for section in slanted for crossing in section.inside)]
-        crossings = tuple(c for c in fine if not any(lies_on(c, feature) for feature in wide))
+        # several sections may hold what stands off all of them
+        fine = {id(c): c for c in [*rest, *upon, *(crossing for section in slanted for crossing in section.inside)]}
+        crossings = tuple(c for c in fine.values() if not any(lies_on(c, feature) for feature in wide))
         if wide and spacing is not None:
             looked = inspections.at(spacing)
             beside = _linked(replace(detections, crossings=crossings), laid, looked)
@@ -99,7 +102,7 @@ def assemble(
         wide = [feature for feature in wide if feature not in alone or feature in left]
     if faint:
         features = with_faint_lines(features, detections, laid, base, false_alarms_per_metre, inspections)
-    return _strongest_first([*wide, *features])
+    return _strongest_first([*wide, *round_it, *features])
 
 
 def inspected_for(

@@ -193,6 +193,7 @@ def _stretches(
     height = profile.height.copy()
     certainty = _certainties(profile, bank, null)
     weak: list[tuple[int, float]] = []
+    told = set[tuple[int, int, bool]]()
     changed = True
     for _ in range(MOST_DISTURBANCE_ROUNDS):
         if changed:
@@ -204,12 +205,16 @@ def _stretches(
             if changed and snr * bank.seen(height, place, k) / crest < threshold:
                 continue
             begin, end = _extent(height, place, half_width, crest, profile, noise, tip_radius)
-            yield height.copy(), begin, end, crest, snr
+            # unevenness anywhere along a crest that the sweep ran along reaches as far as that: one stretch
+            if (begin, end, crest > 0.0) not in told:
+                yield height.copy(), begin, end, crest, snr
+            told.add((begin, end, crest > 0.0))
             if snr < HIDING * threshold:
                 weak.append((place, half_width))
                 continue
             shoulders = _shoulders(height, begin, end, bank)
             changed = True
+            told.clear()
             height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
 
 

@@ -1,0 +1,105 @@
+"""Round lines: what one sweep felt round the body, as no spot is felt: a line that it ran along.
+
+A spot is felt on the side of the body that it stands on. A sweep that winds round the body and stays off the base for
+longer ran along a line, as along a ring that one turn of a helix passes. No sweep crosses it: how wide it is nothing
+tells, and it is at least as high as it was felt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mapping import Details, Feature, IntArray, Interval, Support
+from mapping.assembly.free.outline import WIDER_THAN_CREST
+from mapping.assembly.linking import Inspection
+from mapping.detection import Crossing, Detections
+from mapping.inference.kinds import kind_made_of
+
+# Points of the axis are so far apart round the body, rad: chords between them lie a thousandth of its radius under it
+AXIS_STEP = 0.1
+# Standard deviations that a place stands clear of its noise by: one of 700 does by chance
+CLEAR_SDS = 3.0
+ALONE = (
+    "one sweep ran along it round the body, and none crosses it: nothing tells how far beside that sweep it lies, and "
+    "how wide it is"
+)
+
+
+def round_lines(
+    detections: Detections, inspection: Inspection, tip_radius: float
+) -> tuple[list[Feature], tuple[Crossing, ...]]:
+    """The lines that single sweeps ran along round the body, and the crossings that are no part of them.
+
+    Args:
+        detections: crests and hollows of all sweeps.
+        inspection: heights of all places.
+        tip_radius: m.
+    """
+    found, parts = list[Feature](), set[int]()
+    for crossing in detections.crossings:
+        run = _run(crossing, inspection)
+        wide = crossing.half_width > WIDER_THAN_CREST * np.sqrt(2.0 * tip_radius * abs(crossing.height))
+        if wide and (inspection.normals[run] @ crossing.normal < 0.0).any():
+            found.append(_line(crossing, run, inspection, detections, tip_radius))
+            # what is lower on it is how its flanks, which no filter is as long as, differ from a crest's
+            beside = [c for c in detections.crossings if c.sweep == crossing.sweep and not c.is_step]
+            on_it = np.isin(inspection.nearest(np.array([c.point for c in beside])), run)
+            top = 0.5 * abs(found[-1].height.median)
+            parts |= {id(c) for c, on in zip(beside, on_it, strict=True) if on and abs(c.height) < top}
+            parts.add(id(crossing))
+    return found, tuple(c for c in detections.crossings if id(c) not in parts)
+
+
+def _run(crossing: Crossing, inspection: Inspection) -> IntArray:
+    """Places of its sweep about a crest or hollow, and within it, that stand off as it does, clear of their noise."""
+    own = inspection.of_sweep(crossing.sweep)
+    if crossing.is_step or not len(own):
+        return own[:0]
+    way = inspection.points[own]
+    passed = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
+    middle = passed[int(np.linalg.norm(way - crossing.point, axis=1).argmin())]
+    own = own[np.abs(passed - middle) < crossing.half_width]
+    felt = np.sign(crossing.height) * inspection.height[own]
+    low, top = np.flatnonzero(felt < CLEAR_SDS * inspection.sd[own]), int(felt.argmax())
+    begin, end = low[low < top], low[low > top]
+    run: IntArray = own[int(begin[-1]) + 1 if len(begin) else 0 : int(end[0]) if len(end) else len(own)]
+    return run
+
+
+def _line(
+    crossing: Crossing, run: IntArray, inspection: Inspection, detections: Detections, tip_radius: float
+) -> Feature:
+    """The ridge or groove along those of a run of places that are half as high as the highest."""
+    felt = np.abs(inspection.height[run])
+    run = run[felt > 0.5 * felt.max()]
+    chosen = [run[0]]
+    for place in run[1:]:
+        if place == run[-1] or inspection.normals[place] @ inspection.normals[chosen[-1]] < np.cos(AXIS_STEP):
+            chosen.append(place)
+    axis = inspection.points[chosen]
+    # the highest of many places is so by noise: in the middle third the sweep was nearest to the crest
+    middle = run[len(run) // 3 : max(2 * len(run) // 3, 1)]
+    height = float(np.median(inspection.height[middle]))
+    likely = Interval.normal(height, float(inspection.sd[middle].mean() / np.sqrt(len(middle))))
+    reach = float(np.sqrt(2.0 * tip_radius * abs(height)))
+    length = float(np.linalg.norm(np.diff(axis, axis=0), axis=1).sum())
+    kind = kind_made_of("convex" if height > 0.0 else "concave", line=True).name
+    alone = (
+        "one sweep ran along it round the body, and none crosses it: where it lies beside that sweep, and how wide it "
+    )
+    alone += "is, nothing tells"
+    return Feature(
+        kind=kind,
+        axis=axis,
+        normals=inspection.normals[chosen],
+        height=replace(likely, censored=True),
+        width=Interval(reach, 0.0, 2.0 * reach, censored=True, bounded=True),
+        length=Interval(length, length, length, censored=True),
+        evidence=Support(crossing.snr, 1, (detections.algorithm,)),
+        curvature_feature=False,
+        position_sd=float(reach / np.sqrt(3.0)),
+        notes=(ALONE,),
+        details=Details(free_section=True, misfit=ALONE),
+    )
