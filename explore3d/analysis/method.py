@@ -20,7 +20,7 @@ from explore3d.analysis.standard_heights import StandardHeight, has_sections, st
 from explore3d.analysis.surface_account import SurfaceAccount, swept_share
 from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature
-from explore3d.log import Log, stop_of
+from explore3d.log import Log, read_noise, stop_of
 from explore3d.scene import AnalysisSettings, Scene
 from mapping import Dropped, EnvelopeError, Feature, LeftOut, Trace, length_text, place_text
 from mapping.assembly import (
@@ -198,7 +198,8 @@ class Work:
 
     def __post_init__(self) -> None:
         self.trace = self.log.trace
-        self.settings = AnalysisSettings.of(self.scene).of_means(self.log.metadata.get("average"))
+        settings = AnalysisSettings.of(self.scene, read_noise(self.log.events))
+        self.settings = settings.of_means(self.log.metadata.get("average"))
         if self.log.tip_sd is not None:
             self.settings = replace(self.settings, tip_sd=self.log.tip_sd)
         if self.given is not None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from explore3d import SceneError, seconds_text
 from explore3d.analysis import Computing
-from explore3d.log import KIND, SURVEY, Stop, base_event
+from explore3d.log import KIND, NOISE, SURVEY, Stop, base_event
 from explore3d.scene import extent_text
 from hw import FingerError, Move, Workspace
 from mapping import FloatArray, Trace, length_text
@@ -416,7 +416,7 @@ class Explorer:
 
         Args:
             execute: carries out one move.
-            event: told the base, and what was refused.
+            event: told the base, what was refused, and the noise as it was measured on the way.
             watch: counts the sweeps of the survey, if anyone asks.
             meanwhile: takes what can be worked out while the finger moves; what `execute` does not do of it, the plan
                 does when it needs it.
@@ -433,6 +433,8 @@ class Explorer:
             count=None if watch is None else watch.begun(), meanwhile=meanwhile
         )
         found, _ = self.carry_out(plan, base, execute, event, left)
+        if found.value is not None and found.value.noise is not None:
+            event(NOISE, found.value.noise.record)
         detail = f"{found.detail}; before that, to know the base: {outcome.detail}" if outcome.detail else found.detail
         return Outcome(found.reason, detail, Explored(base, found.value))
 

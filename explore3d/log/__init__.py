@@ -13,6 +13,7 @@ if TYPE_CHECKING:
         KIND as KIND,
         LOG as LOG,
         MAGIC as MAGIC,
+        NOISE as NOISE,
         OUTCOME as OUTCOME,
         SURVEY as SURVEY,
         VERSION as VERSION,
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
         newest_log as newest_log,
         read_base as read_base,
         read_log as read_log,
+        read_noise as read_noise,
         stop_of as stop_of,
     )
     from explore3d.log.table import sidecar_of as sidecar_of
@@ -64,6 +66,7 @@ _PUBLIC = {
         "Log",
         "LogStream",
         "LogWriter",
+        "NOISE",
         "OUTCOME",
         "Recorder",
         "SURVEY",
@@ -78,6 +81,7 @@ _PUBLIC = {
         "must_fit_analysis",
         "read_base",
         "read_log",
+        "read_noise",
         "stop_of",
     ),
     "table": ("sidecar_of",),

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from mapping.instrument import StatedNoise
+from mapping.instrument import Noise, StatedNoise
 
 if TYPE_CHECKING:
     from explore3d.scene.scene import Scene
@@ -22,6 +22,7 @@ class AnalysisSettings:
         seed: of the posterior's chains.
         tip_sd: standard deviation of the tip's radius, m.
         noise: of the centres, as the scene states it; None: not stated.
+        begin: of the centres, as whoever felt them measured it on the way; None: nobody did.
     """
 
     algorithm: int = 3
@@ -29,24 +30,26 @@ class AnalysisSettings:
     seed: int = 1
     tip_sd: float = 0.0
     noise: StatedNoise | None = None
+    begin: Noise | None = None
 
     @classmethod
-    def of(cls, scene: Scene | None) -> AnalysisSettings:
+    def of(cls, scene: Scene | None, begin: Noise | None = None) -> AnalysisSettings:
         """The settings of a scene; the defaults without one."""
         if scene is None:
-            return cls()
+            return cls(begin=begin)
         of = scene.detection
-        return cls(of.algorithm, of.false_alarms_per_metre, scene.seed, scene.tip.radius_sd, scene.noise)
+        return cls(of.algorithm, of.false_alarms_per_metre, scene.seed, scene.tip.radius_sd, scene.noise, begin)
 
     def of_means(self, average: Mapping[str, Any] | None) -> AnalysisSettings:
-        """The same of a recording whose samples are means: their white noise is less than the scene states."""
-        if average is None or self.noise is None:
+        """The same of a recording whose samples are means: their white noise is less than that of single samples."""
+        if average is None:
             return self
-        noise = self.noise.noise.scaled(white=float(average["white_noise"]))
-        return replace(self, noise=replace(self.noise, noise=noise))
+        less = float(average["white_noise"])
+        noise = None if self.noise is None else replace(self.noise, noise=self.noise.noise.scaled(white=less))
+        return replace(self, noise=noise, begin=None if self.begin is None else self.begin.scaled(white=less))
 
     @property
     def detection(self) -> dict[str, Any]:
         """Arguments of `mapping.detection.detect.detect`."""
         rate = self.false_alarms_per_metre
-        return {"algorithm": self.algorithm, "false_alarms_per_metre": rate, "stated": self.noise}
+        return {"algorithm": self.algorithm, "false_alarms_per_metre": rate, "stated": self.noise, "begin": self.begin}

@@ -121,6 +121,7 @@ def detect(
     false_alarms_per_metre: float = 0.01,
     noise: Noise | None = None,
     stated: StatedNoise | None = None,
+    begin: Noise | None = None,
     largest: float | None = None,
 ) -> Detections:
     """Find every crossing of something that the base does not explain.
@@ -136,6 +137,8 @@ def detect(
         false_alarms_per_metre: expected number of false crossings per metre of path, 1/m.
         noise: of the samples; None: estimated from the trace.
         stated: what is known of the noise before, say from a data sheet; it guides the estimate over a given mesh.
+        begin: of the samples, as whoever felt them measured it on a part of them: over a given mesh the search for the
+            quiet path begins there in what is not stated, and nothing else follows from it.
         largest: half-width of the widest disturbance that counts as a fine feature, m; None: four tip radii.
 
     Raises:
@@ -154,7 +157,7 @@ def detect(
     laid = LaidTrace.of(trace, base)
     if noise is None and len(trace) <= RAW_SAMPLES:
         laid.feet()  # the noise is read from nearly all of them: whatever else is read follows from that
-    asked = _Asked(algorithm, false_alarms_per_metre, noise, stated, largest)
+    asked = _Asked(algorithm, false_alarms_per_metre, noise, stated, begin, largest)
     return _detected(trace, laid, asked)
 
 
@@ -166,6 +169,7 @@ class _Asked:
     false_alarms_per_metre: float
     noise: Noise | None
     stated: StatedNoise | None
+    begin: Noise | None
     largest: float | None
 
 
@@ -178,10 +182,12 @@ def _detected(trace: Trace, laid: LaidTrace, asked: _Asked, of_each: Noise | Non
         return Detections((), noise or Noise(0.0), algorithm, np.inf, PROBABILITY, np.inf, 0.0, left_out)
     raw = float(np.median([_step(sweep) for sweep in usable]))
     stretches = [] if noise else raw_stretches(usable)
-    first = of_each or (floored(noise, tip) if noise else first_noise(stretches, raw, tip, base.known))
-    if asked.stated is not None and noise is None and of_each is None and base.known:
+    first = of_each or noise
+    if first is None and base.known:
         # most of a log may lie on details, and the noise that most samples tell is theirs then
-        first = floored(asked.stated.instead_of(first), tip)
+        first = asked.begin or first_noise(stretches, raw, tip)
+        first = first if asked.stated is None else asked.stated.instead_of(first)
+    first = floored(first or first_noise(stretches, raw, tip, base.known), tip)
     widest = LARGEST * tip if asked.largest is None else asked.largest
     of_sweeps = _profiles(usable, first, tip)
     keep, unfelt = _felt(laid, dict(zip(map(id, usable), of_sweeps, strict=True)))
@@ -193,6 +199,7 @@ def _detected(trace: Trace, laid: LaidTrace, asked: _Asked, of_each: Noise | Non
             false_alarms_per_metre=false_alarms_per_metre,
             noise=noise,
             stated=asked.stated,
+            begin=asked.begin,
             largest=asked.largest,
         )
         return _in_all(felt, keep, laid, unfelt)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -69,6 +69,16 @@ class Noise:
         if first is None:
             return cls(white, 0.0, length, tuple(terms))
         return cls(white, first.sd, first.length, tuple(t for t in terms if t is not first))
+
+    @classmethod
+    def read(cls, record: Mapping[str, Any]) -> Noise:
+        """The noise of a `record`.
+
+        Raises:
+            KeyError, TypeError, NoiseError: it is none.
+        """
+        further = tuple(Term(**term) for term in record.get("further", ()))
+        return cls(record["white"], record["correlated"], record["length"], further)
 
     @property
     def terms(self) -> tuple[Term, ...]:

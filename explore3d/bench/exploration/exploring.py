@@ -143,7 +143,7 @@ def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus"
 def _swept(strategy: str, explorer: Explorer, body: BenchScene, clock: _Clock, seed: int) -> Outcome:
     """Explore, or sweep blindly under the same checks; the outcome's value is an Explored."""
     if strategy in EXPLORING:
-        return explorer.go(clock.execute, meanwhile=clock.waits.meanwhile)
+        return explorer.go(clock.execute, clock.event, meanwhile=clock.waits.meanwhile)
     base = Base(body.base)
     outcome, _ = explorer.carry_out(BASELINES[strategy](base, np.random.default_rng(seed)), base, clock.execute)
     return Outcome(outcome.reason, outcome.detail, Explored(base))
@@ -184,18 +184,22 @@ class _Clock:
     def __init__(self, finger: Finger) -> None:
         self.waits = Waits(finger.execute, finger.workspace.max_speed)
         self.felt: list[Trace] = []
-        self.moves: list[Event] = []
+        self.events: list[Event] = []
         self._samples = 0
 
     def execute(self, move: Move) -> Trace:
         before = float(self.felt[-1].t[-1]) if self.felt else None
         trace = self.waits(move)
-        self.moves.append(move_event(move, before, self._samples, len(trace)))
+        self.events.append(move_event(move, before, self._samples, len(trace)))
         if len(trace):
             self.felt.append(trace)
             self._samples += len(trace)
         return trace
 
+    def event(self, kind: str, data: dict[str, Any]) -> None:
+        """Note something beside the samples."""
+        self.events.append(Event(kind, float(self.felt[-1].t[-1]) if self.felt else None, data))
+
     def log(self) -> Log:
         """What was recorded, as the log of a run would give it."""
-        return Log(Trace.concatenate(self.felt), events=tuple(self.moves))
+        return Log(Trace.concatenate(self.felt), events=tuple(self.events))

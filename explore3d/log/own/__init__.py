@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from explore3d.log.own.record import (
         EXPLORATION as EXPLORATION,
         KIND as KIND,
+        NOISE as NOISE,
         OUTCOME as OUTCOME,
         SURVEY as SURVEY,
         Event as Event,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
         merge as merge,
         move_event as move_event,
         read_base as read_base,
+        read_noise as read_noise,
         stop_of as stop_of,
     )
     from explore3d.log.own.stream import (
@@ -70,6 +72,7 @@ _PUBLIC = {
         "Event",
         "KIND",
         "Log",
+        "NOISE",
         "OUTCOME",
         "SURVEY",
         "Stop",
@@ -77,6 +80,7 @@ _PUBLIC = {
         "merge",
         "move_event",
         "read_base",
+        "read_noise",
         "stop_of",
     ),
     "stream": ("LogStream", "count_samples", "head", "large_log"),

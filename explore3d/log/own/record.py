@@ -15,8 +15,9 @@ import numpy as np
 
 from explore3d import UserError, count_text
 from hw import Move
-from mapping import Surface, SurfaceError, Trace
+from mapping import NoiseError, Surface, SurfaceError, Trace
 from mapping.base import Base, Form
+from mapping.instrument import Noise
 from mapping.model import Tolerance
 
 if TYPE_CHECKING:
@@ -225,4 +226,23 @@ def read_base(events: Sequence[Event]) -> Base | None:
                 return Base.read(surface, event.data["kind"], event.data["parameters"])
             except (KeyError, TypeError, SurfaceError) as error:
                 raise UserError(f"the log's base event is not readable: {error}") from error
+    return None
+
+
+# Kind of event: the noise of the samples, as who explored measured it on the way
+NOISE = "noise"
+
+
+def read_noise(events: Sequence[Event]) -> Noise | None:
+    """The last noise that the events hold, None if none does.
+
+    Raises:
+        UserError: a noise event that is not one.
+    """
+    for event in reversed(events):
+        if event.kind == NOISE:
+            try:
+                return Noise.read(event.data)
+            except (KeyError, TypeError, NoiseError) as error:
+                raise UserError(f"the log's noise event is not readable: {error}") from error
     return None

@@ -18,7 +18,8 @@ from scene_files import write_scene_file
 from explore3d.analysis.result import Analysis
 from explore3d.jobs.analyze import analyze
 from explore3d.jobs.run import run
-from explore3d.log import Log, Recorder
+from explore3d.log import Log, Recorder, read_log, read_noise
+from explore3d.scene import AnalysisSettings
 
 ASSETS = Path(__file__).resolve().parents[3] / "assets"
 
@@ -86,6 +87,16 @@ def test_the_wire_is_found_once_and_where_it_is(wire: tuple[Path, Analysis]) -> 
     assert row.end_error < 0.3e-3
     assert abs(row.length_error) < 0.3e-3
     assert abs(row.height_error) < 0.05e-3
+
+
+def test_the_analysis_begins_with_the_noise_that_was_measured_while_exploring(wire: tuple[Path, Analysis]) -> None:
+    out, _ = wire
+    noise = read_noise(read_log(out / "log.mcap").events)
+    assert noise is not None
+    assert noise.white == pytest.approx(0.05e-3, rel=0.1)
+    assert AnalysisSettings.of(None, noise).detection["begin"] == noise
+    of_means = AnalysisSettings.of(None, noise).of_means({"white_noise": 0.5})
+    assert of_means.detection["begin"].white == 0.5 * noise.white
 
 
 def test_the_output_folder_holds_scene_log_model_report_and_pictures(wire: tuple[Path, Analysis]) -> None:

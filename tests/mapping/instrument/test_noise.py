@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from mapping.errors import NoiseError
 from mapping.instrument.noise import Noise, estimate_noise
+from mapping.instrument.term import Term
 
 
 def drawn(noise: Noise, count: int, spacing: float, rng: np.random.Generator) -> np.ndarray:
@@ -108,3 +110,8 @@ def test_rounding_joins_what_is_correlated_already():
     assert noise.white == 2e-6 and noise.correlated**2 == pytest.approx(1e-12 + rounding)
     assert noise.correlated**2 * noise.length == pytest.approx(1e-12 * 1e-3 + rounding * 4e-6)
     assert Noise(2e-6, 1e-6, 1e-3).rounded(0.0) == Noise(2e-6, 1e-6, 1e-3)
+
+
+def test_what_is_recorded_is_read_again():
+    noise = Noise(1.0, 2.0, 3.0, (Term(4.0, 5.0), Term(6.0, 7.0, 8.0)))
+    assert Noise.read(json.loads(json.dumps(noise.record))) == noise
