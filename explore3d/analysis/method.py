@@ -533,7 +533,7 @@ def why_no_injection(work: Work) -> str:
         return "the model is shown to be wrong beyond repair"
     if work.log.detections:
         return "the log was detected in while it was read"
-    return "" if work.detections.remarks or work.detections.left_out else "the noise is as the fitted law says"
+    return "" if work.detections.limit_in_doubt else "the noise is as the fitted law says"
 
 
 def limit_measured(work: Work, share: Share) -> None:

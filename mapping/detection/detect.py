@@ -55,6 +55,7 @@ MOST_CELLS = 4000
 MUCH_MORE, SMALLEST_ASKED, WIDTHS_ASKED = 12.0, 0.1, 8
 # A sweep of fewer samples has no level, slope and noise of its own, and half a crest.
 SHORTEST_SWEEP_SAMPLES = 8
+TOO_SHORT = "are too few to inspect"
 # Share of the path that may be taken by what exceeds the threshold without being clear, before the law is doubted:
 # simulated in white noise 1.5, 2, 2.5, 3 times as fitted, that share is 0.01, 0.1, 0.23, 0.35; features on a fifth of
 # the path would make the median of all of it a third too large.
@@ -98,6 +99,11 @@ class Detections:
     injected: int = 0
     recovered: int = 0
     doubt: float = 1.0
+
+    @property
+    def limit_in_doubt(self) -> bool:
+        """True if anything speaks against the limit as computed; sweeps that are too short to be looked at do not."""
+        return bool(self.remarks) or not all(said.endswith(TOO_SHORT) for said in self.left_out)
 
     @classmethod
     def together(cls, parts: Sequence[Detections]) -> Detections:
@@ -488,7 +494,7 @@ def _usable(laid: LaidTrace) -> tuple[list[LaidSweep], tuple[str, ...]]:
             usable.append(sweep)
         else:
             length = s[-1] if len(s) else 0
-            left_out.append(f"sweep {sweep.number}: {count} samples over {length_text(length)} are too few to inspect")
+            left_out.append(f"sweep {sweep.number}: {count} samples over {length_text(length)} {TOO_SHORT}")
     return usable, tuple(left_out)
 
 

@@ -60,3 +60,12 @@ def test_too_short_a_log_says_that_nothing_was_measured() -> None:
     measured = recovered(detect(trace, PLATE), trace, np.random.default_rng(0))
     assert measured.injected == 0
     assert "computed, not measured" in measured.left_out[-1]
+
+
+def test_a_sweep_too_short_to_be_looked_at_puts_the_limit_in_no_doubt() -> None:
+    trace = laid(np.ones(SWEEPS))
+    short = trace.select(np.flatnonzero((trace.sweep < SWEEPS - 1) | (np.arange(len(trace)) % len(S) < 7)))
+    computed = detect(short, PLATE)
+    assert len(computed.left_out) == 1 and not computed.limit_in_doubt
+    assert replace(computed, remarks=("the noise is not the same everywhere",)).limit_in_doubt
+    assert replace(computed, left_out=(*computed.left_out, "9 samples were not felt and are left out")).limit_in_doubt
