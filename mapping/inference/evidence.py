@@ -52,8 +52,7 @@ def log_evidence(problem: PosteriorProblem, rng: np.random.Generator) -> float:
 
 def log_evidence_of_nothing(target: LogPosterior) -> float:
     """The same where only the base, and neighbours that the target knows of, left the trace."""
-    bare = np.zeros((1, len(target.likelihood.window))) if target.beside is None else target.beside[None]
-    return float(target.likelihood.log_density(bare)[0])
+    return float(target.likelihood.log_density(target.bare)[0])
 
 
 def at_optima(problem: PosteriorProblem) -> PosteriorProblem:

@@ -120,7 +120,7 @@ def _section(problem: PosteriorProblem, theta: FloatArray) -> tuple[FloatArray, 
     shape: Any = with_nominal_tip(problem).target.shape
     window, kind = problem.window, kind_of(problem.feature)
     beside = problem.target.beside
-    inside = np.ones(len(window), dtype=bool) if beside is None else beside == 0.0
+    inside = np.ones(len(window), dtype=bool) if beside is None else beside.apart.copy()
     if kind.line:
         s, lateral, _ = shape.chart.coordinates(window.feet)
         away = lateral - shape.modes.lateral(theta[None, : shape.modes.count], s)[0]
@@ -194,8 +194,7 @@ def _score(residual: FloatArray, slopes: FloatArray, columns: FloatArray, prior:
 def _free_log_odds(problem: PosteriorProblem, section: FloatArray) -> float:
     """Of a free section against nothing; amplitudes marginalised (Rasmussen and Williams 2006, section 2.7)."""
     target, shape = problem.target, problem.target.shape
-    beside = np.zeros((1, len(problem.window))) if target.beside is None else target.beside[None]
-    data, columns = target.likelihood.residuals(beside)[0], _whitened(target, section)
+    data, columns = target.likelihood.residuals(target.bare)[0], _whitened(target, section)
     prior, gram, along = FREE_AMPLITUDE * problem.sizes.height, columns @ columns.T, columns @ data
     explained = 0.5 * float(along @ np.linalg.solve(gram + np.eye(len(section)) / prior**2, along))
     freedom = 0.5 * float(np.linalg.slogdet(np.eye(len(section)) + prior**2 * gram)[1])

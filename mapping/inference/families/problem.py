@@ -10,6 +10,7 @@ from mapping import Feature, FloatArray, Trace
 from mapping.base import Base
 from mapping.geometry.mesh import distances
 from mapping.inference.likelihood import (
+    Beside,
     Likelihood,
     LogPosterior,
     Nuisance,
@@ -104,9 +105,9 @@ class PosteriorProblem:
         window: Window,
         around: Surroundings,
         beginnings: FloatArray,
-        beside: FloatArray | None,
+        beside: Beside | None,
     ) -> Self:
-        """With the noise of the surroundings, and the heights (n,) that neighbours leave beside the feature, m."""
+        """With the noise of the surroundings, and what neighbours leave beside the feature."""
         vague = 3.0 * max(sizes.height, around.noise.sd)
         bend = 0.0 if around.base.kind == "mesh" else 0.3 * sizes.height
         nuisance = Nuisance(vague, vague, bend)

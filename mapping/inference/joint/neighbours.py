@@ -17,9 +17,15 @@ import numpy as np
 from mapping import EmptyWindowError, Feature, FloatArray, Posterior
 from mapping.geometry.mesh import arclengths, resample
 from mapping.inference import described_at
-from mapping.inference.families import MODEL_FLOOR, PosteriorProblem, Surroundings, window_of_all
+from mapping.inference.families import (
+    MODEL_FLOOR,
+    PosteriorProblem,
+    Surroundings,
+    tells_of_line,
+    window_of_all,
+)
 from mapping.inference.joint.joined_shape import JoinedShape
-from mapping.inference.kinds import LineKind, PointKind, feature_trace, felt_together, kind_of, sizes_of
+from mapping.inference.kinds import LineKind, PointKind, feature_trace, felt_beside, kind_of, sizes_of
 from mapping.inference.likelihood import LogPosterior, Nuisance, Shape, Window, build_likelihood
 from mapping.inference.sampler import find_optima, laplace, linearised, root_of
 
@@ -51,15 +57,19 @@ class NeighboursDoubt:
         """The draws of a posterior that holds the neighbours, with what it lacks thereby: their optimum goes with them,
         to first order."""
         window = problem.window
-        traces = np.array([self._trace(feature, window) for feature in self.near])
-        still = replace(problem.target, beside=felt_together(traces))
+        traces = [self._trace(feature, window) for feature in self.near]
+
+        def beside(traces: Sequence[FloatArray]) -> LogPosterior:
+            return replace(problem.target, beside=felt_beside(problem.feature, self.near, traces, window.feet))
+
+        still = beside(traces)
         best = posterior.samples[int(np.argmax(still.log_density(posterior.samples)))]
         residual, jacobian = linearised(still, best)
         changes = np.empty((len(residual), len(self.moved)))
         for column, (number, feature) in enumerate(self.moved):
-            other = traces.copy()
+            other = [*traces]
             other[number] = self._trace(feature, window)
-            changes[:, column] = replace(still, beside=felt_together(other)).residuals(best[None])[0] - residual
+            changes[:, column] = beside(other).residuals(best[None])[0] - residual
         response = -laplace(still, best, scanned=False).covariance @ jacobian.T @ changes @ self.root
         normal = rng.standard_normal((len(posterior.samples), response.shape[1]))
         samples = np.clip(posterior.samples + normal @ response.T, still.low, still.high)
@@ -138,17 +148,17 @@ class Together:
 
 
 def laid_together(features: Sequence[Feature], around: Surroundings) -> Together | None:
-    """Features where they are likeliest together; None if one of them has no family that ends, or no sample is near.
+    """Features where they are likeliest together; None if one of them has no family, or no sample is near.
 
     Args:
         features: that disturb one another's traces, as they were detected.
         around: trace, base, noise, and others near by, which are held as they are.
     """
-    if not all(_ends(feature) for feature in features):
+    if not all(_has_course(feature) for feature in features):
         return None
     sizes = [sizes_of(feature, around.trace.tip_radius) for feature in features]
     noise = around.noise.rounded(around.trace.resolution)
-    held = [other for other in around.others if _ends(other)]
+    held = [other for other in around.others if _has_course(other)]
     try:
         window = _window(features, replace(around, noise=noise))
         shapes = [_shape_on(window, feature, around) for feature in features]
@@ -173,16 +183,14 @@ def _shape_on(window: Window, feature: Feature, around: Surroundings) -> Shape:
     return kind.shape_on(window, feature, around)
 
 
-def _ends(feature: Feature) -> bool:
-    """True of a point, or of a line of two points or more that ends or comes back to itself."""
+def _has_course(feature: Feature) -> bool:
+    """True of a point that has a family, or of a line of two points or more."""
     kind = kind_of(feature)
-    if not kind.sampled or not kind.line:
-        return kind.sampled
-    return len(feature.axis) > 1 and (kind.has_ends or feature.closed)
+    return kind.sampled and (len(feature.axis) > 1 or not kind.line)
 
 
 def _window(features: Sequence[Feature], around: Surroundings) -> Window:
-    """The bins near some features."""
+    """The bins near some features that tell of all of them."""
     tip = around.trace.tip_radius
     sizes = [sizes_of(feature, tip) for feature in features]
     crests = list[FloatArray]()
@@ -191,4 +199,9 @@ def _window(features: Sequence[Feature], around: Surroundings) -> Window:
         count = int(np.ceil(arclengths(feature.axis)[-1] / (CREST_SPACING * size.half_width))) + 1
         crests.append(resample(both, count) if len(both) > 1 else both)
     points, normals = np.hsplit(np.concatenate(crests), 2)
-    return window_of_all(points + tip * normals, normals, sizes, around)
+    window = window_of_all(points + tip * normals, normals, sizes, around)
+    for feature, size in zip(features, sizes, strict=True):
+        kind = kind_of(feature)
+        if kind.line and not kind.has_ends and not feature.closed:
+            window = window.only(tells_of_line(feature.axis, feature.normals, window.feet, window.run, size.half_width))
+    return window

@@ -10,11 +10,11 @@ import numpy as np
 from mapping import Feature, Interval, Trace
 from mapping.base import Base
 from mapping.inference import noise_of_trace, refine, settle
-from mapping.inference.families import Surroundings
+from mapping.inference.families import WINDOW_REACH, Surroundings
 from mapping.inference.joint.blocks import blocks_of, gaps
 from mapping.inference.joint.junctions import Meeting, brought_together, meetings
 from mapping.inference.joint.neighbours import MOST_TOGETHER, NeighboursDoubt, laid_together
-from mapping.inference.kinds import sizes_of
+from mapping.inference.kinds import kind_of, sizes_of
 from mapping.instrument import Noise
 
 # What fewer crossings show may be false, and would explain a part of a true neighbour's trace and be supported by it
@@ -113,9 +113,16 @@ def _beside(features: Sequence[Feature], half_widths: Sequence[float]) -> list[s
 
 def _groups(numbers: Sequence[int], features: Sequence[Feature], tip: float) -> list[list[int]]:
     """The numbers of features whose disturbances touch, as wide as they may be, directly or by others between them, in
-    blocks of MOST_TOGETHER that lie nearest together; none of one alone."""
+    blocks of MOST_TOGETHER that lie nearest together; none of one alone.
+
+    A step goes on to wherever its level does: one whose wall lies in the window of another one touches it.
+    """
     wide = [replace(feature, width=Interval(*(feature.width.high,) * 3)) for feature in features]
-    gap = gaps(wide, [sizes_of(feature, tip).half_width for feature in wide])
+    reaches = [
+        sizes_of(feature, tip).half_width * (0.5 * (WINDOW_REACH + 1.0) if kind_of(feature).sided else 1.0)
+        for feature in wide
+    ]
+    gap = gaps(wide, reaches)
     blocks = blocks_of(gap, range(len(features)), MOST_TOGETHER)
     return [sorted(numbers[k] for k in block) for block in blocks if len(block) > 1]
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     )
     from mapping.inference.kinds.points import PointKind as PointKind, PointShape as PointShape, Seen as Seen
     from mapping.inference.kinds.posterior_density import (
-        felt_together as felt_together,
+        felt_beside as felt_beside,
         height_prior as height_prior,
         place_prior as place_prior,
     )
@@ -47,6 +47,6 @@ _PUBLIC = {
     ),
     "lines": ("LineKind", "LineShape", "Parameters", "Traced"),
     "points": ("PointKind", "PointShape", "Seen"),
-    "posterior_density": ("felt_together", "height_prior", "place_prior"),
+    "posterior_density": ("felt_beside", "height_prior", "place_prior"),
 }
 doorway(__name__, _PUBLIC)

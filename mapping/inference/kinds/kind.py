@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval, MappingError
+from mapping.geometry.mesh import arclengths, nearest_on
 from mapping.geometry.proxy import Part
 from mapping.geometry.templates import contact_half_width, radius_of_cap
 from mapping.inference.families import PosteriorProblem, Sizes, Surroundings
@@ -250,6 +251,21 @@ def sizes_of(feature: Feature, tip_radius: float) -> Sizes:
 def feature_trace(feature: Feature, feet: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
     """(N,) heights that a feature's median shape leaves on the trace, m, by its kind; see `Kind.trace`."""
     return kind_of(feature).trace(feature, feet, normals, tip_radius)
+
+
+def uphill(step: Feature, points: FloatArray) -> FloatArray:
+    """(N,) distances of points (N, 3) from the edge of a step, to its high side, m; 0 where that is not known.
+
+    The edge goes on straight beyond its ends, as far as anyone asks.
+    """
+    axis, side = step.axis, step.details.high_side
+    if side is None or len(axis) < 2:
+        return np.zeros(len(points))
+    leg = np.searchsorted(arclengths(axis), nearest_on(points, axis)[1]) - 1
+    leg = np.clip(leg, 0, len(axis) - 2)
+    lateral = np.cross(step.normals[leg], axis[leg + 1] - axis[leg])
+    length = np.maximum(np.linalg.norm(lateral, axis=1), np.finfo(float).tiny)
+    return np.asarray(side * ((points - axis[leg]) * lateral).sum(axis=1) / length)
 
 
 def preliminary(feature: Feature, tip_radius: float) -> tuple[float, float, float]:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from mapping import EmptyWindowError, Feature, FloatArray
-from mapping.geometry.mesh import arclengths
+from mapping.geometry.mesh import arclengths, nearest_on
 from mapping.inference.curves import CurveModes, chart_along
-from mapping.inference.families import GrooveShape, PosteriorProblem, Sizes, Surroundings
-from mapping.inference.kinds.kind import feature_trace
-from mapping.inference.likelihood import Prior, Shape, StudentT, Uniform, Window
+from mapping.inference.families import GrooveShape, PosteriorProblem, Sizes, StepShape, Surroundings
+from mapping.inference.kinds.kind import feature_trace, kind_of, uphill
+from mapping.inference.likelihood import Beside, Prior, Shape, StudentT, Uniform, Window
 
 # Prior of log radius: a ball lying on the base (a = H/2) unless the data say otherwise, with heavy tails.
 RADIUS_SCALE = 1.0
@@ -27,17 +28,56 @@ def pose(
     near = [other for other in around.others if other is not feature]
     if near:
         tip = around.trace.tip_radius
-        beside = felt_together(np.array([feature_trace(other, window.feet, window.normals, tip) for other in near]))
+        traces = [feature_trace(other, window.feet, window.normals, tip) for other in near]
+        beside = felt_beside(feature, near, traces, window.feet, shape if isinstance(shape, StepShape) else None)
         if type(shape) is GrooveShape:
             laid = [_laid(other, window, around) for other in near if _is_upright(other)]
             shape = replace(shape, crossed=tuple(each for each in laid if each is not None))
     return PosteriorProblem.posed(feature, sizes, shape, window, around, beginnings, beside)
 
 
-def felt_together(traces: FloatArray) -> FloatArray:
-    """(n,) heights that features leave together beside another one, from those (M, n) that each leaves alone, m."""
-    highest, lowest = np.max(traces, axis=0), np.min(traces, axis=0)
-    return np.asarray(np.where(highest > 0.0, highest, lowest))
+def felt_beside(
+    feature: Feature,
+    near: Sequence[Feature],
+    traces: Sequence[FloatArray],
+    feet: FloatArray,
+    step: StepShape | None = None,
+) -> Beside:
+    """What features leave together beside another one, from what each leaves alone.
+
+    Of hollows that cross the deeper one is felt. Which side of a step a crest stands on is asked at the place of its
+    axis that is nearest.
+
+    Args:
+        feature: the one that is asked about.
+        near: the others.
+        traces: (n,) heights that each of them leaves alone, m.
+        feet: (n, 3) where, m.
+        step: the family of the one that is asked about, if that is a step.
+    """
+    nothing = np.zeros(len(feet))
+    ground, deepest, crests, apart = nothing, nothing, nothing, np.ones(len(feet), dtype=bool)
+    steps = [(other, trace) for other, trace in zip(near, traces, strict=True) if kind_of(other).sided]
+
+    def under(crest: Feature) -> FloatArray:
+        if not steps:
+            return nothing
+        on = nearest_on(feet, crest.axis)[0]
+        return np.asarray(sum(np.where(uphill(other, on) > 0.0, trace, 0.0) for other, trace in steps))
+
+    for other, trace in zip(near, traces, strict=True):
+        if kind_of(other).sided:
+            ground = ground + trace
+            apart &= (trace == 0.0) | (trace == abs(other.height.median))
+            continue
+        apart &= trace == 0.0
+        deepest = np.minimum(deepest, trace)
+        raised = np.where(trace > 0.0, trace + under(other), 0.0)
+        if step is not None:  # what stands on its high side goes up with it
+            carried = step.high_side * step.chart.coordinates(nearest_on(feet, other.axis)[0])[1] > 0.0
+            ground, raised = ground + np.where(carried, raised, 0.0), np.where(carried, 0.0, raised)
+        crests = np.maximum(crests, raised)
+    return Beside(ground + deepest, crests, under(feature), kind_of(feature).sign > 0, apart)
 
 
 def _is_upright(other: Feature) -> bool:

@@ -10,7 +10,7 @@ from mapping import Feature, FloatArray, Interval
 from mapping.geometry.proxy import Part, Terrace
 from mapping.geometry.templates import contact_half_width, step_height
 from mapping.inference.families import Sizes, StepShape
-from mapping.inference.kinds.kind import Section, place_sd, preliminary
+from mapping.inference.kinds.kind import Section, place_sd, preliminary, uphill
 from mapping.inference.kinds.lines import LineKind, Parameters, Traced
 from mapping.inference.kinds.posterior_density import height_prior
 from mapping.inference.likelihood import Shape
@@ -24,6 +24,11 @@ class Step(LineKind):
         height, sd, _ = preliminary(feature, tip_radius)
         half = float(contact_half_width(min(height, tip_radius), 0.0, tip_radius))
         return Sizes(height, sd, 0.0, half, place_sd(feature, half))
+
+    def trace(self, feature: Feature, feet: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
+        """(N,) heights over the low side, m; 0 where it is not known which that is; see `Kind.trace`."""
+        away = uphill(feature, feet)
+        return step_height(away, abs(feature.height.median), tip_radius) if away.any() else away
 
     def shape(self, traced: Traced) -> StepShape:
         height = traced.sizes.height

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from mapping.inference.likelihood.beside import Beside as Beside
     from mapping.inference.likelihood.bin_filter import bin_filter as bin_filter
     from mapping.inference.likelihood.gaussian import (
         Likelihood as Likelihood,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     )
 
 _PUBLIC = {
+    "beside": ("Beside",),
     "bin_filter": ("bin_filter",),
     "gaussian": ("Likelihood", "Nuisance", "build_likelihood"),
     "priors": ("LogOfUniform", "Normal", "Prior", "StudentT", "Uniform"),

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from recorded_features import TIP, feature, line, plate, record
+import pytest
+from recorded_features import TIP, feature, line, plate, record, wire
 
-from mapping.geometry.templates.shapes import cap_height
+from mapping.geometry.templates.shapes import cap_height, step_height
 from mapping.inference.families import Surroundings
 from mapping.inference.feature_posterior import refine, settle
 from mapping.inference.joint.neighbours import laid_together
@@ -62,3 +63,42 @@ def test_domes_are_all_as_high_as_they_are():
         assert one.height.low - 1e-6 < HEIGHT < one.height.high + 1e-6 and not any(
             "no ideal" in note for note in one.notes
         )
+
+
+@pytest.mark.parametrize(("apart", "second"), [(4e-3, 0.2e-3), (3e-3, -0.15e-3)])
+def test_two_near_steps_are_changes_of_one_level_and_the_next(apart, second):
+    """A stair, and a terrace, whose second wall lies in the window of the first one."""
+
+    def felt(feet):
+        up = 1.0 if second > 0.0 else -1.0
+        return step_height(feet[:, 0], 0.2e-3, TIP) + step_height(up * (feet[:, 0] - apart), abs(second), TIP)
+
+    rows = [line((-12e-3, y), (12e-3, y), 60e-6) for y in np.arange(-6e-3, 6.5e-3, 1e-3)]
+    guesses = [
+        feature("step", np.array([[x, -5e-3, 0.0], [x, 5e-3, 0.0]]), height, 0.0, 10)
+        for x, height in ((0.0, 0.2e-3), (apart, second))
+    ]
+    found = refine_all(guesses, record(rows, felt, NOISE, 1), 0, base=plate(), noise=NOISE, confirm=None)
+    for one, height, x in zip(found, (0.2e-3, second), (0.0, apart), strict=True):
+        assert one.details.misfit is None
+        assert abs(one.height.median - height) < 2e-6
+        np.testing.assert_allclose(one.axis[:, 0], x, atol=0.05e-3)
+        assert np.sign(one.height.median) == np.sign(height)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_wire_stands_on_the_level_of_a_step_beside_it(side):
+    wall = feature("step", np.array([[0.0, -9e-3, 0.0], [0.0, 9e-3, 0.0]]), 0.3e-3, 0.0, 10)
+    wall = replace(wall, details=replace(wall.details, high_side=-1.0))  # x > 0
+    ends = np.array([[4e-3 * side, -8e-3, 0.0], [4e-3 * side, 8e-3, 0.0]])
+    top = wire(ends + np.array([0.0, 0.0, max(side, 0.0) * 0.3e-3]), 0.4e-3)
+
+    def felt(feet):
+        return np.maximum(step_height(feet[:, 0], 0.3e-3, TIP), top(feet))
+
+    rows = [line((-15e-3, y), (15e-3, y), 120e-6) for y in np.arange(-10e-3, 10.5e-3, 2e-3)]
+    guess = feature("ridge", ends * [1.0, 0.9, 1.0], 0.35e-3, 0.4e-3, 8)
+    trace = record(rows, felt, NOISE, 1)
+    found = refine(guess, trace, np.random.default_rng(0), base=plate(), noise=NOISE, others=[wall], confirm=None)
+    assert found.details.misfit is None
+    assert abs(found.height.median - 0.4e-3) < 4e-6
