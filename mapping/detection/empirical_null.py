@@ -305,14 +305,17 @@ def seen(local: FloatArray, bins: float) -> FloatArray:
 
 
 def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank, k: int, least: float) -> FloatArray:
-    """Outputs of a filter over their sd, `least` at least, one a coarse bin; NaN where it sees not all quiet path."""
+    """Outputs of a filter over their sd, one a coarse bin; NaN where it sees not all quiet path, or noise below the
+    rounding, `least`, whose level is known."""
     f = bank.filters[k]
     if len(height) < 2 * f.coarse:
         return np.full(0, np.nan)
     crest, sd = f.heights(bank.levelled(height))
     z, bins, places = crest / sd, f.half_width / bank.spacing, slice(None, len(crest) * f.coarse, f.coarse)
     if not (local == 1.0).all():
-        z /= np.maximum(seen(local, bins)[places], least)
+        scale = seen(local, bins)[places]
+        z /= np.maximum(scale, least)
+        z[scale < least] = np.nan
     if not quiet.all():
         z[running_mean((~quiet).astype(np.float64), max(1, int(bins)))[places] > MISSING_SHARE] = np.nan
     return np.asarray(z)

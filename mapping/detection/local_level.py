@@ -22,18 +22,19 @@ from mapping.detection.filters import FILTER_BINS_PER_HALF_WIDTH, Bank
 # sqrt(2 / pi) (1 - exp(-q^2 / 2)) / 0.75 with q = 1.1503, the quantile.
 SMALLER_SHARE, MEAN_OF_SMALLER = 0.75, 0.51489
 # Variance of the logarithm of the variance so told, for one bin; simulated: 5.3 in white noise, 4.1 in correlated noise
-# (the median absolute difference: 6.6).
-LOG_VARIANCE_PER_BIN = 5.3
+# (the median absolute difference: 6.6); by second differences 6.4 and 5.3.
+LOG_VARIANCE_PER_BIN, LOG_VARIANCE_BY_BENDS = 5.3, 6.4
 # Bins in a cell of the local level: three half-widths of the narrowest filter, which sees the level's mean over two.
 LEVEL_BINS = 3 * FILTER_BINS_PER_HALF_WIDTH
 # Standard deviations of chi-square by which levels must differ more than sampling makes them: at nine degrees of
 # freedom one in five hundred logs of one level has that; it is asked some ten times a log, of filters that see alike
 CLEAR_EXCESS = 4.0
 # Twice the log-likelihood that a level of its own by sweep and along the sweeps must bring; in 1,600 simulated logs of
-# one level (1 to 24 sweeps, 10 to 300 cells each) the likeliest of the ladder brought 11.2 at most.
+# one level (1 to 24 sweeps, 10 to 300 cells each) the likeliest of the ladder brought 11.2 at most; in 600 of 40 to 400
+# sweeps (10 and 40 cells each) 7.7 at most.
 LEVEL_GAIN = 12.0
 # Variances of the logarithm of the variance, and lengths in cells, among which the likeliest are chosen; and sweeps
-# that are asked, evenly chosen.
+# that are asked, evenly chosen by how loud they are.
 LEVEL_VARIANCES, LEVEL_LENGTHS, ASKED_SWEEPS = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0), (2.0, 4.0, 8.0, 16.0, 32.0), 24
 
 
@@ -61,21 +62,17 @@ def local_levels(
 ) -> LocalLevels:
     """The level along each profile, by differences of neighbouring quiet bins, for the samples that these have.
 
+    Where nothing of a profile is quiet, its noise may be what was taken for details: all of its bins tell the level, by
+    their second differences. Details leave little of these, for they are many bins wide: a crest of height H one
+    72nd of H.
+
     Args:
         profiles: with bins of the bank's width.
         heights: (n,) of each, m, without what is clearly no noise.
         quiet: (n,) of each: False where something was taken out.
         bank: filters for the fitted noise.
     """
-    lags = bank.noise.block_covariances(2, bank.spacing, bank.samples)
-    white = bank.noise.white**2
-    terms = max(2 * (lags[0] - lags[1] - white / bank.samples), 0.0)
-    told = []
-    for profile, height, keep in zip(profiles, heights, quiet, strict=True):
-        counts = np.diff(profile.first)
-        share = white / np.maximum(counts, 1)
-        sd = np.sqrt(np.maximum(share[1:] + share[:-1] + terms, np.finfo(float).tiny))
-        told.append(_difference_levels(height, keep & (counts > 0), sd))  # an empty bin lies between its neighbours
+    told = [_told(profile, height, keep, bank) for profile, height, keep in zip(profiles, heights, quiet, strict=True)]
     ones = [np.ones(len(h)) for h in heights]
     y = np.concatenate([each for each, _ in told])
     v = np.concatenate([each for _, each in told])
@@ -102,14 +99,31 @@ def _at_bins(level: FloatArray, bins: int) -> FloatArray:
     return np.interp(np.arange(bins), (np.arange(len(level)) + 0.5) * bins / len(level), level)
 
 
-def _difference_levels(height: FloatArray, quiet: BoolArray, sd: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(C,) logarithm of the variance in each cell, and its sampling variance, infinite where nothing is known.
+def _told(profile: SweepHeights, height: FloatArray, quiet: BoolArray, bank: Bank) -> tuple[FloatArray, FloatArray]:
+    """(C,) logarithm of the variance over the fitted one in each cell of a profile, and its sampling variance, infinite
+    where nothing is known."""
+    counts = np.diff(profile.first)
+    lags = bank.noise.block_covariances(3, bank.spacing, bank.samples)
+    share = bank.noise.white**2 / np.maximum(counts, 1)
+    correlated, felt = lags - [bank.noise.white**2 / bank.samples, 0.0, 0.0], counts > 0
 
-    Args:
-        height, quiet: (n,) of the bins.
-        sd: (n - 1,) standard deviations of their differences under the fitted law, m.
-    """
-    step = np.where(quiet[1:] & quiet[:-1], np.abs(np.diff(height)) / sd, np.nan)
+    def relative(differences: FloatArray, variance: FloatArray, known: BoolArray) -> FloatArray:
+        sd = np.sqrt(np.maximum(variance, np.finfo(float).tiny))
+        return np.where(known, np.abs(differences) / sd, np.nan)
+
+    keep = quiet & felt  # an empty bin lies between its neighbours
+    variance = share[1:] + share[:-1] + max(2 * (correlated[0] - correlated[1]), 0.0)
+    told = _by_cells(relative(np.diff(height), variance, keep[1:] & keep[:-1]), LOG_VARIANCE_PER_BIN)
+    if np.isfinite(told[1]).any() or len(counts) < 3:
+        return told
+    variance = share[2:] + 4 * share[1:-1] + share[:-2] + max(float(correlated @ [6.0, -8.0, 2.0]), 0.0)
+    known = felt[2:] & felt[1:-1] & felt[:-2]
+    return _by_cells(relative(np.diff(profile.height, 2), variance, known), LOG_VARIANCE_BY_BENDS)
+
+
+def _by_cells(step: FloatArray, variance_per_bin: float) -> tuple[FloatArray, FloatArray]:
+    """(C,) logarithm of the mean square of differences (n,) over their sd in each cell, and its sampling variance;
+    differences that are not known are NaN."""
     cells = max(1, len(step) // LEVEL_BINS)
     edges = np.linspace(0, len(step), cells + 1).astype(np.int64)
     y, v = np.zeros(cells), np.full(cells, np.inf)
@@ -119,20 +133,24 @@ def _difference_levels(height: FloatArray, quiet: BoolArray, sd: FloatArray) -> 
         if len(part) >= FILTER_BINS_PER_HALF_WIDTH:
             smaller = np.partition(part, int(SMALLER_SHARE * len(part)))[: int(SMALLER_SHARE * len(part))]
             y[c] = 2 * np.log(max(float(smaller.mean()) / MEAN_OF_SMALLER, 1e-12))
-            v[c] = LOG_VARIANCE_PER_BIN / len(part)
+            v[c] = variance_per_bin / len(part)
     return y, v
 
 
 def _level_prior(told: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[float, float, float] | None:
     """Variances by sweep and along the sweeps and length in cells that are likeliest; None if none is needed."""
-    of_sweep = [(float(y @ (1 / v)), float(np.sum(1 / v))) for y, v in told if np.isfinite(v).any()]
-    between = excess(np.array([a / w for a, w in of_sweep]), np.array([1 / w for _, w in of_sweep]))
+    told = [(y, v) for y, v in told if np.isfinite(v).any()]
+    errors = np.array([1 / float(np.sum(1 / v)) for _, v in told])
+    of_sweep = errors * np.array([float(y @ (1 / v)) for y, v in told])
+    between = excess(of_sweep, errors)
     y, v = np.concatenate([y for y, _ in told]), np.concatenate([v for _, v in told])
     if between == 0.0 and excess(y[np.isfinite(v)], v[np.isfinite(v)]) == 0.0:
         return None
     from mapping.detection.level_kernels import level_likelihood
 
-    chosen = [told[i] for i in np.unique(np.linspace(0, len(told) - 1, ASKED_SWEEPS).astype(np.int64))]
+    # a few sweeps of another level may have any numbers: all levels must be among those that are asked
+    ranks = np.unique(np.linspace(0, len(told) - 1, ASKED_SWEEPS).astype(np.int64))
+    chosen = [told[i] for i in np.argsort(of_sweep, kind="stable")[ranks]]
 
     def likelihood(prior: tuple[float, float, float]) -> float:
         return float(sum(level_likelihood(y, v, *prior) for y, v in chosen))
