@@ -148,15 +148,20 @@ def _progress(x: FloatArray, sweep: IntArray) -> float:
 
 
 def cloud_order(points: FloatArray, jump: float | None) -> Order | None:
-    """Sweeps of points: cut at each jump, or where straight rows turn; None if the points are in no order."""
+    """Sweeps of points: cut at each jump, or where straight rows turn; None if the points are in no order.
+
+    A wall higher than the ball is climbed from one sample to the next: a step aside is no jump of a row that goes on.
+    """
     steps = np.sqrt(sum(np.diff(column) ** 2 for column in points.T))
     moving = steps[steps > 0]
     if jump is not None or not len(moving):
         return Order(None, _counted(steps > (np.inf if jump is None else jump)))
     if _disordered(points, moving):
         return None
-    jumps = steps > JUMP * float(np.median(moving[:: len(moving) // 100_000 * 2 + 1]))
-    turned = _rows_that_turn(points)
+    longest = JUMP * float(np.median(moving[:: len(moving) // 100_000 * 2 + 1]))
+    jumps, turned = steps > longest, _rows_that_turn(points)
+    if turned is not None:  # within a row that goes on as before a ball climbed a wall
+        jumps &= (np.diff(turned) > 0) | (np.abs(np.diff(points @ _main_direction(points))) > longest)
     if turned is None or turned[-1] <= jumps.sum():
         return Order(None, _counted(jumps))
     sweep = _counted(jumps | (np.diff(turned) > 0))

@@ -286,6 +286,15 @@ def test_sweeps_are_cut_where_the_finger_jumped(tmp_path: Path, back_and_forth: 
     assert np.array_equal(read(tmp_path, rows(points)).trace.sweep, line)
 
 
+@pytest.mark.parametrize("back_and_forth", [False, True])
+def test_a_wall_that_a_row_climbs_from_one_sample_to_the_next_does_not_cut_it(
+    tmp_path: Path, back_and_forth: bool
+) -> None:
+    points, line = raster(0.0, back_and_forth)
+    points[:, 2] = np.where(points[:, 0] > 10.0, 2.0, 0.0)
+    assert np.array_equal(read(tmp_path, rows(points)).trace.sweep, line)
+
+
 def test_noise_much_larger_than_the_spacing_does_not_cut_sweeps(tmp_path: Path) -> None:
     rng = np.random.default_rng(6)
     points = np.column_stack([np.arange(20_000) * 6e-3, *rng.normal(0, 0.2, (2, 20_000))])
