@@ -30,6 +30,7 @@ from mapping.inference.configuration.proposals import (
     as_far_as_felt,
     as_point,
     dense,
+    may_be_closed,
 )
 from mapping.inference.configuration.search import CROWDED, Account, searched
 from mapping.inference.configuration.told import in_words
@@ -274,9 +275,11 @@ def _holding(beside: Sequence[Feature], place: Neighbourhood) -> Neighbourhood:
 
 
 def _is_plain(start: Configuration) -> bool:
-    """True of at most one detail that has no wide section to choose, and over which nothing stands out."""
+    """True of at most one detail that has no wide section to choose, is not closed perhaps, and over which nothing
+    stands out."""
     wide = any(isinstance(part.shape, RidgeShape) for part in start.parts) and not all(start.as_narrow_as_wires)
-    return len(start.parts) < 2 and not wide and not bool((np.abs(start.standing_off) > PEAK_SDS).any())
+    returns = any(may_be_closed(part) for part in start.parts)
+    return len(start.parts) < 2 and not wide and not returns and not bool((np.abs(start.standing_off) > PEAK_SDS).any())
 
 
 def _weighed(feature: Feature) -> bool:

@@ -173,7 +173,7 @@ def chained(now: Configuration) -> Iterator[Parts]:
         support = replace(like.feature.evidence, crossings=crossings)
         like = replace(like, feature=replace(like.feature, evidence=support))
         courses = [course] if len(used) > 1 else []
-        if float(np.linalg.norm(course[-1] - course[0])) < CLOSING_GAP * float(arclengths(course)[-1]):
+        if _comes_near(course):
             courses.append(np.vstack([course, course[:1]]))
         for each, degree in itertools.product(courses, (*LOWER_DEGREES, HIGHEST_DEGREE)):
             try:
@@ -181,6 +181,17 @@ def chained(now: Configuration) -> Iterator[Parts]:
             except MappingError:  # pieces that are of no course: as smooth as that it turns back, or leaves the base
                 continue
             yield [*rest, line]
+
+
+def may_be_closed(part: Part) -> bool:
+    """True of an open line that may return to where it began."""
+    kind = kind_of(part.feature)
+    return kind.line and kind.has_ends and not part.feature.closed and _comes_near(axis_of(part))
+
+
+def _comes_near(course: FloatArray) -> bool:
+    """True if a polyline (K, 3) ends where it may be closed."""
+    return float(np.linalg.norm(course[-1] - course[0])) < CLOSING_GAP * float(arclengths(course)[-1])
 
 
 def _course_of(axes: list[FloatArray], half_width: float) -> tuple[FloatArray, list[int]]:

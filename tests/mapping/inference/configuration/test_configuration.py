@@ -59,6 +59,11 @@ def test_an_end_that_one_sweep_alone_felt_belongs_to_its_line() -> None:
     assert result["right"], result
 
 
+def test_a_ring_is_closed_where_a_line_with_ends_fits_as_well() -> None:
+    result = trial("O-ring", "apparatus", "two ways", FIRST_BUILT_WITH + 1)
+    assert result["right"], result
+
+
 @pytest.mark.parametrize(("body", "off"), [("burred groove", 4e-6), ("wire over a step", 90e-6)])
 def test_details_together_leave_what_the_ball_feels_of_them(body: str, off: float) -> None:
     # the flank of two crests within a bin is off by 0.02 of their 0.14 mm; the wire climbs the step over half a
