@@ -220,11 +220,23 @@ def _rounds(path: RolledOut, cuts: list[int]) -> list[int]:
             if turned[-1] <= 2.0 * np.pi:
                 break
             first, last = (here + int(k) for k in np.searchsorted(turned, [np.pi, 2.0 * np.pi]))
+            if not _comes_back(path, here, last):
+                here = last
+                continue
             # the chord about a place begins half a span before it
             low, high = max(first - span // 2, 0), max(last - span // 2, 1)
             here = max(low + int(np.argmin(rough[low:high])) + span // 2, here + 1)
             rounds.append(here)
     return rounds
+
+
+def _comes_back(path: RolledOut, here: int, last: int) -> bool:
+    """True of a path that once round has come back to a quarter of its way, or nearer.
+
+    Over a body with waists and holes the normal turns as far on a way that leads on.
+    """
+    away = np.linalg.norm(path.places[last] - path.places[here])
+    return bool(away < (ONCE_ROUND[1] / (2.0 * np.pi) - 1.0) * abs(path.plane[last] - path.plane[here]))
 
 
 def _beyond(direction: FloatArray, here: int) -> tuple[int, int] | None:
