@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from mapping import EmptyWindowError, Feature, FloatArray
+from mapping import CourseError, EmptyWindowError, Feature, FloatArray
 from mapping.inference.curves import (
     HIGHEST_DEGREE,
     Chart,
@@ -213,6 +213,8 @@ class LineKind(Kind):
             return chart_along(line, lift, around.base, tip, spacing, extension, sizes.half_width, bends=bends)
 
         trial = build((length + 2.0 * extension) / 64.0, False)
+        if trial.length < length / MOST_LEGS:  # a course that the data do not hold runs far off the base
+            raise CourseError("less than a leg of its axis lies over the base")
         turn = np.linalg.norm(np.diff(trial.tangents, axis=0), axis=1).max(initial=0.0)
         curvature = turn / (trial.length / max(len(trial.s) - 1, 1))
         if curvature * trial.length < 1e-6 and degree == 1:

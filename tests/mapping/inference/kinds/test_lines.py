@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from mapping import CourseError
 from mapping.base.base import Base
 from mapping.feature import Feature, Interval, Support
 from mapping.geometry.templates.shapes import chain_height
 from mapping.inference.families.problem import Surroundings
 from mapping.inference.feature_posterior import pose_problem, refine
+from mapping.inference.kinds import lines
+from mapping.inference.kinds.ridge import Ridge
 from mapping.inference.sampler import find_optima
 from mapping.instrument.noise import Noise
 from mapping.surface import Surface
@@ -102,3 +107,13 @@ def test_an_arm_that_meets_another_line_ends_where_they_meet() -> None:
         room = (target.high - target.low)[target.shape.names.index("start")]
         assert 1e-3 < room < widest
     assert room > 8e-3  # where nothing else is, only the sweeps tell where it ends
+
+
+def test_a_course_of_which_less_than_a_leg_is_left_on_the_base_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    left = SimpleNamespace(length=1e-6, tangents=np.eye(3)[:2], s=np.array([0.0, 1e-6]))
+    monkeypatch.setattr(lines, "chart_along", lambda *_, **__: left)
+    axis = np.linspace([0.0, 0.0, 0.0], [3.0, 0.0, 0.0], 30)  # legs of a micrometre would take all memory
+    around = SimpleNamespace(trace=SimpleNamespace(tip_radius=TIP), base=PLATE)
+    sizes = SimpleNamespace(half_width=2e-3, height=D)
+    with pytest.raises(CourseError, match="less than a leg"):
+        Ridge._chart(SimpleNamespace(has_ends=True), axis, np.tile(UP, (30, 1)), sizes, 30, 8, around, bends=True)
