@@ -6,10 +6,10 @@ The base is an event of the log: it can be analysed where the scene's mesh files
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -200,6 +200,8 @@ def stop_of(log: Log) -> Stop | None:
     return Stop(str(outcome.get("cause") or outcome.get("detail") or outcome["reason"]), sweeps, planned)
 
 
+Held = TypeVar("Held")  # what an event holds
+
 KIND = "base"
 
 
@@ -219,14 +221,7 @@ def read_base(events: Sequence[Event]) -> Base | None:
     Raises:
         UserError: a base event that is not one.
     """
-    for event in reversed(events):
-        if event.kind == KIND:
-            try:
-                surface = Surface(event.data["vertices"], event.data["faces"])
-                return Base.read(surface, event.data["kind"], event.data["parameters"])
-            except (KeyError, TypeError, SurfaceError) as error:
-                raise UserError(f"the log's base event is not readable: {error}") from error
-    return None
+    return _last(events, KIND, lambda of: Base.read(Surface(of["vertices"], of["faces"]), of["kind"], of["parameters"]))
 
 
 # Kind of event: the noise of the samples, as who explored measured it on the way
@@ -239,10 +234,15 @@ def read_noise(events: Sequence[Event]) -> Noise | None:
     Raises:
         UserError: a noise event that is not one.
     """
+    return _last(events, NOISE, Noise.read)
+
+
+def _last(events: Sequence[Event], kind: str, read: Callable[[dict[str, Any]], Held]) -> Held | None:
+    """What the last event of a kind holds, None if there is none."""
     for event in reversed(events):
-        if event.kind == NOISE:
+        if event.kind == kind:
             try:
-                return Noise.read(event.data)
-            except (KeyError, TypeError, NoiseError) as error:
-                raise UserError(f"the log's noise event is not readable: {error}") from error
+                return read(event.data)
+            except (KeyError, TypeError, SurfaceError, NoiseError) as error:
+                raise UserError(f"the log's {kind} event is not readable: {error}") from error
     return None
