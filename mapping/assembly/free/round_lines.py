@@ -17,9 +17,9 @@ from mapping.assembly.linking import Inspection
 from mapping.detection import Crossing, Detections
 from mapping.inference.kinds import kind_made_of
 
-# Points of the axis are so far apart round the body, rad: chords between them lie a thousandth of its radius under it
+# Points of the axis are so far apart round the body, rad: chords lie 0.1^2 / 8, a thousandth of its radius, under it
 AXIS_STEP = 0.1
-# Standard deviations that a place stands clear of its noise by: one of 700 does by chance
+# Standard deviations that a place stands clear of its noise by: one of 740 does by chance (one side of a Gaussian)
 CLEAR_SDS = 3.0
 ALONE = (
     "one sweep ran along it round the body, and none crosses it: nothing tells how far beside that sweep it lies, and "
@@ -38,25 +38,33 @@ def round_lines(
         tip_radius: m.
     """
     found, parts = list[Feature](), set[int]()
-    for crossing in detections.crossings:
+    for crossing in sorted(detections.crossings, key=lambda each: -each.snr):
+        crest = WIDER_THAN_CREST * float(np.sqrt(2.0 * tip_radius * abs(crossing.height)))
+        if crossing.is_step or id(crossing) in parts or crossing.half_width < crest:
+            continue
         run = _run(crossing, inspection)
-        wide = crossing.half_width > WIDER_THAN_CREST * np.sqrt(2.0 * tip_radius * abs(crossing.height))
-        if wide and (inspection.normals[run] @ crossing.normal < 0.0).any():
-            found.append(_line(crossing, run, inspection, detections, tip_radius))
-            # what is lower on it is how its flanks, which no filter is as long as, differ from a crest's
-            beside = [c for c in detections.crossings if c.sweep == crossing.sweep and not c.is_step]
-            on_it = np.isin(inspection.nearest(np.array([c.point for c in beside])), run)
-            top = 0.5 * abs(found[-1].height.median)
-            parts |= {id(c) for c, on in zip(beside, on_it, strict=True) if on and abs(c.height) < top}
-            parts.add(id(crossing))
+        if not (inspection.normals[run] @ crossing.normal < 0.0).any():
+            continue
+        line = _line(crossing, run, inspection, detections, tip_radius)
+        found.append(line)
+        # as wide and of its sign, it is the same line again; lower, it is how flanks that no filter is as long as
+        # differ from a crest's
+        height = line.height.median
+        beside = [c for c in detections.crossings if c.sweep == crossing.sweep and not c.is_step]
+        on_it = np.isin(inspection.nearest(np.array([c.point for c in beside])), run)
+        parts |= {id(crossing)} | {
+            id(c)
+            for c, on in zip(beside, on_it, strict=True)
+            if on and (abs(c.height) < 0.5 * abs(height) or (c.height * height > 0.0 and c.half_width > crest))
+        }
     return found, tuple(c for c in detections.crossings if id(c) not in parts)
 
 
 def _run(crossing: Crossing, inspection: Inspection) -> IntArray:
     """Places of its sweep about a crest or hollow, and within it, that stand off as it does, clear of their noise."""
     own = inspection.of_sweep(crossing.sweep)
-    if crossing.is_step or not len(own):
-        return own[:0]
+    if not len(own):
+        return own
     way = inspection.points[own]
     passed = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
     middle = passed[int(np.linalg.norm(way - crossing.point, axis=1).argmin())]
@@ -86,10 +94,6 @@ def _line(
     reach = float(np.sqrt(2.0 * tip_radius * abs(height)))
     length = float(np.linalg.norm(np.diff(axis, axis=0), axis=1).sum())
     kind = kind_made_of("convex" if height > 0.0 else "concave", line=True).name
-    alone = (
-        "one sweep ran along it round the body, and none crosses it: where it lies beside that sweep, and how wide it "
-    )
-    alone += "is, nothing tells"
     return Feature(
         kind=kind,
         axis=axis,
