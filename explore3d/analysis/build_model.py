@@ -23,6 +23,7 @@ from explore3d.analysis.method import (
     placed,
     refined_all,
     roughness_taken,
+    set_down,
     side_asked,
     sought_along,
     standard_heights_taken,
@@ -69,6 +70,7 @@ def _never(work: Work) -> bool:
 METHOD = (
     MethodStage("base fit", why_no_fit, fitted),
     MethodStage("pose", why_no_pose, placed, possible=lambda work: work.scene is not None and work.base.kind == "mesh"),
+    MethodStage("", None, set_down),
     MethodStage("yielding", why_no_yielding, yielded, possible=lambda work: work.trace.force is not None),
     MethodStage("deviation", why_no_deviation, deviated, possible=lambda work: work.base.kind == "mesh"),
     MethodStage("", None, kept_over_base),
@@ -137,6 +139,7 @@ def _result(work: Work) -> Analysis:
         inspected=work.inspected,
         account=work.account,
         path=work.path,
+        lifted=work.lifted,
         yielding=work.yielding,
         deviation=work.deviation,
         refuted_tip=work.refuted_tip,

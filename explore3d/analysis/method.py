@@ -37,10 +37,12 @@ from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, o
 from mapping.detection import RAW_SAMPLES, Detections, detect, narrowest_groove, recovered
 from mapping.detection.path import (
     Backlash,
+    Lifted,
     PathLedger,
     SoundSweeps,
     SparseSamples,
     backlash,
+    lifted,
     path_ledger,
     sound_sweeps,
     sparse_samples,
@@ -149,6 +151,7 @@ class Work:
         inspections: the heights of the trace that the features were assembled from.
         sound: the trace under sound sweep numbers; None for a log that was searched while it was read.
         path: what became of the recorded path.
+        lifted: what of the recording is no contact, and was left out; None if nothing is known to be.
         yielding: what the finger yields by, put back; None if nothing is known of it.
         deviation: what the given model gets wrong; None if nothing is known to be.
         judgements: what became of the tolerances.
@@ -183,6 +186,7 @@ class Work:
     inspections: Inspections | None = None
     sound: SoundSweeps | None = None
     path: PathLedger | None = None
+    lifted: Lifted | None = None
     yielding: Yielding | None = None
     deviation: Deviation | None = None
     apart: int = 0
@@ -319,6 +323,34 @@ def placed(work: Work, share: Share) -> None:
     work.stages.left_out.append(LeftOut("pose", reason))
 
 
+def set_down(work: Work, share: Share) -> None:
+    """The trace without what a recording that nobody vouches for holds of the way through the air."""
+    if work.log.in_contact or work.log.detections:
+        return
+    work.trace = LaidTrace.of(work.trace, work.base)
+    side_known = work.given is not None or work.trace.has_contact_data
+    work.lifted = lifted(work.trace, side_known)
+    if work.lifted is None:
+        return
+    _go_on_with(work, work.trace.select(work.lifted.felt), share)
+    if work.wants("pose"):
+        placed(work, share)
+    if work.lifted.inwards:
+        work.side = WrongSide(0, 0, 0.0, lifts=work.lifted.pieces)
+
+
+def _go_on_with(work: Work, trace: Trace, share: Share) -> None:
+    """Another trace of the same recording; a base that was fitted is fitted to it."""
+    work.trace = trace
+    if work.before is not None:
+        _, base, mark = work.before
+        work.before = trace, base, mark
+        said = work.stages.left_out
+        said[mark:] = [each for each in said[mark:] if each.stage != ABSORBED]
+    if work.given is None or _was_found(work.given):
+        fitted(work, share)
+
+
 def why_no_yielding(work: Work) -> str | None:
     """Only where forces were recorded can it be told what a finger yields by."""
     return None if work.log.detections or work.trace.force is None else ""
@@ -331,14 +363,7 @@ def yielded(work: Work, share: Share) -> None:
     if work.yielding is None:
         work.stages.left_out.append(LeftOut(YIELDING, "the heights do not follow the recorded forces"))
         return
-    work.trace = work.yielding.without(work.trace)
-    if work.before is not None:
-        _, base, mark = work.before
-        work.before = work.trace, base, mark
-        said = work.stages.left_out
-        said[mark:] = [each for each in said[mark:] if each.stage != ABSORBED]
-    if work.given is None or _was_found(work.given):
-        fitted(work, share)
+    _go_on_with(work, work.yielding.without(work.trace), share)
 
 
 def why_no_deviation(work: Work) -> str | None:
@@ -407,7 +432,8 @@ def side_asked(work: Work, share: Share) -> None:
     """The side of the path that the body lies on, held against the trace's kinks; where it is a round body's wrong one,
     the base is turned over: positions alone do not tell a bore from a shaft."""
     alone = work.given is None and not work.trace.has_contact_data
-    work.side = wrong_side(work.laid) if alone and not work.log.detections else None
+    if work.side is None and alone and not work.log.detections:
+        work.side = wrong_side(work.laid)
     if work.side is not None and work.base.kind in WITH_INSIDE:
         hollow = bool(work.base.parameters.get("hollow", False))
         work.base = fit_base(work.trace, form=work.log.form, inside=not hollow)
@@ -501,7 +527,8 @@ def _begun_again(work: Work, trace: Trace, share: Share) -> None:
 
 def _searched(work: Work) -> None:
     """Crossings of single sweeps; samples that cannot have been felt count no more for anything that follows."""
-    beyond = len(work.log.trace) - len(work.laid) - work.apart
+    in_air = 0 if work.lifted is None else int((~work.lifted.felt).sum())
+    beyond = len(work.log.trace) - in_air - len(work.laid) - work.apart
     work.detections = detect(work.laid, work.base, **work.settings.detection)
     keep = np.ones(len(work.trace), dtype=bool)
     if work.detections.unfelt:
@@ -783,6 +810,7 @@ def modelled(work: Work, share: Share) -> None:
     path = {} if work.path is None else {"path": work.path.record()}
     rough = {} if work.roughness is None else {"roughness": work.roughness.record()}
     deviation = {} if work.deviation is None else {"deviation": work.deviation.record()}
+    in_air = {} if work.lifted is None else {"lifted": work.lifted.record()}
     yields = {} if work.yielding is None else {"yielding": work.yielding.record()}
     refuted = {} if work.refuted_tip is None else {"refuted_tip": work.refuted_tip.record()}
     side = {} if work.side is None else {"wrong_side": work.side.record()}
@@ -797,6 +825,7 @@ def modelled(work: Work, share: Share) -> None:
         | {"inspection": work.inspected.record()}
         | surface
         | path
+        | in_air
         | yields
         | deviation
         | refuted

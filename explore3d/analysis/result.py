@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from explore3d.log import Stop
     from explore3d.scene import Scene
     from mapping.detection import Detections
-    from mapping.detection.path import PathLedger, SparseSamples
+    from mapping.detection.path import Lifted, PathLedger, SparseSamples
     from mapping.estimate.deviation import Deviation, Yielding
     from mapping.estimate.envelope import Estimate, RefutedTip, WrongSide
     from mapping.geometry.curvature import Curvature
@@ -94,6 +94,7 @@ class Analysis:
         folder: where it was written, None if it was not.
         account: which part of the surface was swept, and what became of the rest; None without a scene.
         path: what became of the path that was recorded; None for a log that was searched while it was read.
+        lifted: what of the recording is no contact, and was left out; None if nothing is known to be.
         yielding: what the finger yields by under the recorded forces, put back; None if nothing is known of it.
         deviation: what the given model gets wrong at long wavelengths, None if nothing.
         refuted_tip: what the trace says against the radius of the tip, None if nothing.
@@ -127,6 +128,7 @@ class Analysis:
     folder: Path | None = None
     account: SurfaceAccount | None = None
     path: PathLedger | None = None
+    lifted: Lifted | None = None
     yielding: Yielding | None = None
     deviation: Deviation | None = None
     refuted_tip: RefutedTip | None = None

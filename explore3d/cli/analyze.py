@@ -53,6 +53,10 @@ def analyze(
             metavar="FROM..TO", help="Stretch in x that the base is not fitted to (1.2mm..1.4mm); may be repeated."
         ),
     ] = None,
+    in_contact: Annotated[
+        bool,
+        typer.Option("--in-contact", help="The finger touched at every sample of a table: look for no lifted finger."),
+    ] = False,
     tolerances: Tolerances = None,
     units: Units = None,
     columns: Columns = None,
@@ -93,6 +97,7 @@ def analyze(
             tip_sd=tip_sd,
             form=form,
             mask=mask,
+            in_contact=in_contact or None,
             tolerances=tolerances,
             model=model,
             model_units=model_units,

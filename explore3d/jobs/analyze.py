@@ -22,8 +22,8 @@ from mapping.geometry.mesh import algebra_in_one_thread
 
 # What `analyze` hands on to load_logs and to the readers
 READING_SETTINGS = (
-    "tip_sd", "form", "mask", "tolerances", "units", "columns", "frame", "jump", "reference", "decimal", "pixel",
-    "average", "part",
+    "tip_sd", "form", "mask", "in_contact", "tolerances", "units", "columns", "frame", "jump", "reference", "decimal",
+    "pixel", "average", "part",
 )  # fmt: skip
 
 
@@ -205,6 +205,7 @@ def table_words(tip_radius: str | float | None, table: dict[str, Any]) -> list[s
     words = [] if tip_radius is None else ["--tip-radius", str(tip_radius)]
     for name in ("units", "columns", "pixel", "part", "tip_sd", "form", "tolerances", "average"):
         words += [f"--{name.replace('_', '-')}", str(table[name])] if table.get(name) else []
+    words += ["--in-contact"] if table.get("in_contact") else []
     words += [part for mask in table.get("mask") or () for part in ("--mask", mask)]
     origin = (table.get("frame") or {}).get("origin")
     return words if origin is None else [*words, "--frame", ", ".join(map(str, origin))]

@@ -157,6 +157,7 @@ def _shares_text(account: tuple[tuple[str, float], ...]) -> str:
 def warnings(analysis: Analysis) -> list[str]:
     """What a reader must know before believing the rest, a sentence each."""
     return [
+        *lifted_sentence(analysis),
         *yielding_sentence(analysis),
         *deviation_warning(analysis),
         *path_warning(analysis),
@@ -194,6 +195,14 @@ def tip_warning(analysis: Analysis) -> list[str]:
             f"right ({where})?"
         )
     return told
+
+
+def lifted_sentence(analysis: Analysis) -> list[str]:
+    """What was recorded in the air."""
+    if analysis.lifted is None:
+        return []
+    said = analysis.lifted.sentence()
+    return [f"{said[0].upper()}{said[1:]}."]
 
 
 def yielding_sentence(analysis: Analysis) -> list[str]:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         narrowest_groove as narrowest_groove,
     )
     from mapping.detection.filters.matched_filter import LADDER as LADDER
+    from mapping.detection.outliers import LONGEST_RUN as LONGEST_RUN
     from mapping.detection.paper_algorithms import (
         along_chord as along_chord,
         curvature_features as curvature_features,
@@ -54,6 +55,7 @@ _PUBLIC = {
     "detect": ("LARGEST", "SHORTEST_SWEEP_SAMPLES", "Detections", "detect", "expected_limit"),
     "filters.matched_filter": ("LADDER",),
     "filters.groove_limit": ("DIP", "crest_like_groove", "groove_dip", "narrowest_groove"),
+    "outliers": ("LONGEST_RUN",),
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
     "quiet_noise": ("RAW_SAMPLES", "smallest_crest"),
     "recovery": ("recovered",),

@@ -76,6 +76,7 @@ class Log:
         tip_sd_assumed: True if nobody stated it.
         form: what the base is, where it is fitted.
         tolerances: what the drawing allows; None: what the scene says.
+        in_contact: True if whoever recorded vouches that the finger touched at every sample.
         timed: False if nobody recorded times: `trace.t` counts the samples then, for no clock went with them.
     """
 
@@ -92,6 +93,7 @@ class Log:
     tip_sd_assumed: bool = False
     form: Form = Form()  # noqa: RUF009
     tolerances: tuple[Tolerance, ...] | None = None
+    in_contact: bool = True
     timed: bool = True
 
     @cached_property
@@ -137,6 +139,7 @@ def merge(logs: Sequence[Log]) -> Log:
         tip_sd_assumed=any(log.tip_sd_assumed for log in logs),
         form=next((log.form for log in logs if log.form != Form()), Form()),
         tolerances=tuple(dict.fromkeys(each for log in logs for each in log.tolerances or ())) or None,
+        in_contact=all(log.in_contact for log in logs),
         timed=all(log.timed for log in logs),
     )
 

@@ -51,7 +51,8 @@ def find_columns(table: TableText, given: Mapping[Role, str | int]) -> dict[str,
             )
     for field, names in VECTORS.items():
         some_names = [name for name in names if name in roles]
-        if some_names and len(some_names) < 3:
+        # one force alone is what presses; beside it there is friction, which says nothing of how the finger yields
+        if len(some_names) not in ((0, 1, 3) if field == "force" else (0, 3)):
             raise UserError(
                 f"{table.path}: field columns: {field} need {', '.join(names)}; found {', '.join(some_names)}"
             )

@@ -216,6 +216,7 @@ def _log(found: Samples, settings: TableSettings, sidecar: Path | None) -> Log:
         tip_sd_assumed=settings.tip_sd is None,
         form=Form.read(settings.form, settings.mask),
         tolerances=tuple(each.tolerance() for each in settings.tolerance) or None,
+        in_contact=settings.in_contact,
         timed="t" in roles,
     )
 

@@ -250,6 +250,9 @@ def doubts(text: TableText, roles: dict[str, int], values: Columns, settings: Ta
     same = int(still.sum())
     if same:
         found.append(f"{same} rows repeat the one before")
+    forces = [name for name in VECTORS["force"] if name in roles]
+    if len(forces) == 1:
+        found.append(f"force: {forces[0]} alone, none taken to act across it")
     known = [index for index, name in enumerate(text.names) if index not in roles.values() and name]
     unused = [label(text, index) for index in known if index not in text.texts]
     if unused and "z" not in settings.columns:
@@ -272,8 +275,8 @@ def trace_of(values: Columns, settings: TableSettings, text: TableText, order: O
     moved = settings.frame != type(settings.frame)()
     vectors = {}
     for field, names in VECTORS.items():
-        if names[0] in values:
-            vector = np.column_stack([values[name] for name in names])
+        if any(name in values for name in names):
+            vector = np.column_stack([values.get(name, np.zeros(len(x))) for name in names])
             vectors[field] = vector @ rotation.T + (origin if names[0] in LENGTH_ROLES else 0.0) if moved else vector
     t = values["t"] if "t" in values else np.arange(len(x), dtype=np.float64)
     centers = table @ rotation.T + origin if moved else table

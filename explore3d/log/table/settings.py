@@ -63,6 +63,7 @@ class TableSettings(Table):
         form: what the base of the table is, where it is fitted: "auto", "line", "arc", "poly:N",
             "gaussian:WAVELENGTH" or "none".
         mask: stretches in x that the base is not fitted to, "1.2mm..1.4mm".
+        in_contact: True if the finger touched at every sample; else what is recognised as lifted is left out.
         decimal: sign of the numbers, where the file leaves it open ("1,234"); None: found.
         pixel: distance of the columns and of the rows of a map of heights, m; one for both or two.
         average: runs of so many consecutive samples become one each, their mean; None: every sample is taken.
@@ -79,6 +80,7 @@ class TableSettings(Table):
     tip_sd: Extent | None = None
     form: str = "auto"
     mask: tuple[str, ...] = ()
+    in_contact: bool = False
     decimal: Literal[".", ","] | None = None
     pixel: Annotated[tuple[Length, Length] | None, BeforeValidator(_both_ways)] = None
     average: Annotated[int, Field(ge=1)] | None = None

@@ -26,12 +26,14 @@ class WrongSide:
     Args:
         outwards, inwards: how many bends and kinks of the trace are sharper than the ball, to either side of the base.
         chance: of so many outwards, at most, if all of them were outliers.
+        lifts: how many times the finger was lifted to the side that the body was taken to lie on.
         turned: True if the base was turned over, and what is told rests on the side that the trace speaks for.
     """
 
     outwards: int
     inwards: int
     chance: float
+    lifts: int = 0
     turned: bool = False
 
     def record(self) -> dict[str, Any]:
@@ -40,6 +42,9 @@ class WrongSide:
 
     def sentence(self) -> str:
         """What the trace says, for people."""
+        if self.lifts:
+            times = "once" if self.lifts == 1 else f"{self.lifts} times"
+            return f"the finger was lifted {times} to where the body would be"
         return (
             f"at {self.outwards} places the path bends away from the body more sharply than the ball, as a ball's path "
             f"does only towards it ({self.inwards} places)"

@@ -195,7 +195,7 @@ def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(report, "show", lambda *given: None)
     options = ["--tip-radius", "2 um", "--units", "mm", "--columns", "x=1, z=2", "--frame", "0 mm, 1 mm,5 mm"]
     options += ["--pixel", "1 um", "--part", "/tip", "--average", "20", "--same-object"]
-    options += ["--tip-sd", "20 nm", "--form", "line", "--mask", "1mm..2mm"]
+    options += ["--tip-sd", "20 nm", "--form", "line", "--mask", "1mm..2mm", "--in-contact"]
     options += ["--model", "body.ply", "--model-units", "mm", "--force", "curvature", "--tolerances", "drawing.toml"]
     assert explore3d_main(monkeypatch, "analyze", "a.csv", "b.mcap", "--out", tmp_path, *options) == 0
     ((given, named),) = calls
@@ -213,6 +213,7 @@ def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatc
         "tip_sd": "20 nm",
         "form": "line",
         "mask": ["1mm..2mm"],
+        "in_contact": True,
         "same_object": True,
         "frame": {"origin": ["0 mm", "1 mm", "5 mm"]},
         "model": Path("body.ply"),

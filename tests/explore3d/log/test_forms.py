@@ -176,3 +176,15 @@ def test_a_log_of_1e5_samples_gives_the_same_features_in_every_form(tmp_path: Pa
         counted += 1
         path.unlink()
     assert counted >= 40
+
+
+def test_one_force_alone_is_what_presses(tmp_path: Path) -> None:
+    rows = "\n".join(f"{x},{y},{z},1.5" for x, y, z in SMALL.points)
+    path = tmp_path / "pressed.csv"
+    path.write_text(f"x,y,z,fz\n{rows}\n")
+    log = load_logs([path], tip_radius=1e-3, units="mm")
+    assert log.trace.force == pytest.approx(np.tile([0.0, 0.0, 1.5], (len(SMALL.points), 1)))
+    assert "fz alone" in log.metadata["read_as"][0]
+    path.write_text("x,y,z,fx,fy\n" + "\n".join(f"{x},{y},{z},0.1,0.2" for x, y, z in SMALL.points) + "\n")
+    with pytest.raises(UserError, match="force need fx, fy, fz; found fx, fy"):
+        load_logs([path], tip_radius=1e-3, units="mm")

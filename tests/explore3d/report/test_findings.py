@@ -44,6 +44,7 @@ def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.1
         account=None,
         deviation=None,
         refuted_tip=None,
+        lifted=None,
         yielding=None,
         sparse=None,
         side=None,
