@@ -36,6 +36,8 @@ from mapping.inference.sampler import Laplace, find_optima, laplace
 FITTING_EXCESS = 3.0
 # A line wider than a wire by less is as narrow as one: 2 % of wires are not
 WIDE_SDS = 2.0
+# Signal-to-noise ratio of the gap of two lines that are two: of one in 40 flat tops noise makes as much of a gap
+SINKS_SDS = 2.0
 # Half-width of the crests that a residual is searched with, in that of the narrowest detail: where one is hidden in
 # another's disturbance only a part of it stands out
 SHARPEST = 0.7
@@ -113,6 +115,15 @@ class Configuration:
             not stands_out(part.shape) or 0.5 * strength**2 > -_log_prior(part, self.place)
             for part, strength in zip(self.parts, strengths, strict=True)
         ]
+
+    @property
+    def gaps_are_felt(self) -> bool:
+        """True if every twin is two: the ball sinks into its gap by more than noise makes of a flat top.
+
+        Two wires in one place leave the trace of a narrow bar, by its edges, and are no likelier: it is one detail.
+        """
+        twins = [part for part in self.parts if isinstance(part.shape, TwinShape)]
+        return all(_gap_strength(part, self.place) > SINKS_SDS for part in twins)
 
     def strength(self, k: int) -> float:
         """Signal-to-noise ratio of the k-th part alone, over the bare base."""
@@ -300,7 +311,8 @@ def laid(parts: Sequence[Part], place: Neighbourhood) -> Configuration:
 
 
 def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | None = None) -> Configuration | None:
-    """The configuration of these parts at the optimum of all of them together; None if a rival is far better."""
+    """The configuration of these parts at the optimum of all of them together; None if a rival is far better,
+    or what it calls two details is felt as one."""
     shape = place.joined([part.shape for part in parts])
     theta = np.concatenate([np.zeros(0), *(part.start for part in parts)])
     constants = np.array([constant for _, constant in place.levels])
@@ -331,7 +343,18 @@ def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | N
     plain = sum(_plain(part, found.covariance[own, own]) for part, own in zip(moved, shape.columns, strict=True))
     prior = sum(_log_prior(part, place) for part in parts)
     odds = evidence + float(constants[level]) - float(np.log(len(constants))) + plain + prior
-    return Configuration(moved, place, found, level, float(odds), deviation)
+    whole = Configuration(moved, place, found, level, float(odds), deviation)
+    return whole if whole.gaps_are_felt else None
+
+
+def _gap_strength(twin: Part, place: Neighbourhood) -> float:
+    """Signal-to-noise ratio of the gap of a twin, over the same without one."""
+    shape: Any = twin.shape
+    gapped, filled = (
+        JoinedShape([each], len(place.window), PARTS_OF_BIN).templates(twin.start[None])
+        for each in (shape, shape.filled)
+    )
+    return float(np.linalg.norm(place.levels[0][0].filter.whiten(filled - gapped)[0]))
 
 
 def _is_hollow(part: Part) -> bool:

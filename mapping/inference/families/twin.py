@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from mapping.inference.families.problem import Sizes
 from mapping.inference.families.ridge import RidgeShape
 from mapping.inference.families.trapezoid import NARROWEST_PART, WIDEST_PART
 from mapping.inference.likelihood import LogOfUniform, Prior
+
+# Ridges from one of both to the other that fill the gap: the ball sinks by a 64th of what it sinks into the gap
+FILLED = tuple(np.linspace(-1.0, 1.0, 9).tolist())
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +27,17 @@ class TwinShape:
     Args:
         midway: the ridge on the course between both.
         half_width: of the disturbance of one of them, m: the scale of gaps.
+        sides: where ridges run, as shares of the way from the course to either of both.
     """
 
     midway: RidgeShape
     half_width: float
+    sides: tuple[float, ...] = (-1.0, 1.0)
+
+    @property
+    def filled(self) -> TwinShape:
+        """The same without the gap, which ridges in between fill: a bar from one to the other."""
+        return replace(self, sides=FILLED)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -51,12 +61,11 @@ class TwinShape:
         return np.concatenate([[0.05], self.midway.step])
 
     def templates(self, theta: FloatArray) -> FloatArray:
-        """(W, n) heights over the base's trace, m: the higher of both (dilation distributes over unions)."""
-        one, other = (self.midway.templates(self.single(theta, side)) for side in (-1.0, 1.0))
-        return np.maximum(one, other)
+        """(W, n) heights over the base's trace, m: the highest of all (dilation distributes over unions)."""
+        return np.asarray(np.maximum.reduce([self.midway.templates(self.single(theta, side)) for side in self.sides]))
 
     def single(self, theta: FloatArray, side: float) -> FloatArray:
-        """(W, P - 1) parameters of the ridge on one side, -1 or 1, of the course midway."""
+        """(W, P - 1) parameters of the ridge on one side, -1 or 1, of the course midway, or in between."""
         ridge = theta[:, 1:].copy()
         ridge[:, 0] += side * (0.5 * np.exp(theta[:, 0]) + np.exp(ridge[:, -1]))
         return np.ascontiguousarray(ridge)

@@ -277,10 +277,10 @@ def test_details_that_hide_each_other_are_counted() -> None:
 
 
 def test_where_the_trace_hardly_decides_both_counts_are_stated() -> None:
-    seed = FIRST_BUILT_WITH
-    scene = classified_body("wires 1 mm apart", seed)
+    seed = FIRST_BUILT_WITH + 1
+    scene = classified_body("wires 2 mm apart", seed)
     trace, base = (
-        noisy(touched("wires 1 mm apart", "two ways", seed), NOISE_SOURCES["apparatus"], seed),
+        noisy(touched("wires 2 mm apart", "two ways", seed), NOISE_SOURCES["apparatus"], seed),
         Base(scene.base),
     )
     features = assemble(detect(trace, base), trace, base)
