@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import Details, Feature, FloatArray, Interval, Support
-from mapping.assembly.free.outline import of_all_scales, overlap, times_crest
+from mapping.assembly.free.outline import OF_WIDE_LINE, WIDER_THAN_CREST, of_all_scales, overlap, times_crest
 from mapping.assembly.free.section import FLANK, Section, flanks
 from mapping.assembly.free.sizes import SectionSizes, sizes_of_section
 from mapping.base import SHORTEST_LEVEL, LaidSweep, LaidTrace, SweepHeights
@@ -81,12 +81,14 @@ def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[FreeSe
     levelled = len(trace.base.levels) > 1  # nothing was noticed of what one of them is the floor or the plateau of
     # a single profile, or one on levels, may have a level wherever it lies as high for long
     share = SHORTEST_LEVEL if levelled or trace.base.kind == "profile" else LONGEST_OF_A_ROW
+    # what several sweeps feel is judged together once they are linked
+    least = WIDER_THAN_CREST if len(trace.laid_sweeps) == 1 else OF_WIDE_LINE
     for sweep in trace.laid_sweeps:
         left = by_sweep.pop(sweep.number, [])
         if left or levelled:
             between = float(np.median(np.diff(sweep.arclength)))
             for over in sweep.heights(max(between, FINEST * trace.tip_radius)):
-                own, above = of_all_scales(over, trace.tip_radius, share), _on_levels(over, trace)
+                own, above = of_all_scales(over, trace.tip_radius, share, least), _on_levels(over, trace)
                 above = [each for each in above if not any(overlap(each, other) for other in own)]
                 for number, section in enumerate([*own, *above]):
                     inside = [c for c in left if _overlaps(section, c, sweep.trace.t)]

@@ -190,3 +190,19 @@ def test_a_dent_a_quarter_as_long_as_the_rows_is_one_pit() -> None:
     (found,) = assembled(dented, np.arange(-12.83e-3, 13e-3, 0.5e-3))
     assert found.kind == "pit"
     assert found.height.low < -0.15e-3 < found.height.high
+
+
+def test_a_bead_as_wide_as_the_ball_that_rises_and_falls_is_one_line() -> None:
+    """Felt 1.42 to 1.58 times as wide as a crest: single sweeps of it are less wide than a detail is alone."""
+    aside = np.linspace(-1e-3, 1e-3, 401)[:, None]
+
+    def bead(x: FloatArray, y: FloatArray) -> FloatArray:
+        high, half = (0.57 + 0.067 * np.sin(y / 3e-3)) * 1e-3, (1.0 + 0.1 * np.sin(y / 2.33e-3)) * 1e-3
+        on = high * np.maximum(1.0 - ((x + aside) / half) ** 2, 0.0)
+        return (on + np.sqrt(np.maximum(1e-6 - aside**2, 0.0)) - 1e-3).max(axis=0)
+
+    rows = 0.67e-3 * np.arange(31)
+    (ridge,) = assembled(bead, rows)
+    assert ridge.kind == "ridge"
+    assert np.ptp(ridge.axis[:, 1]) > rows[-2]
+    assert ridge.evidence.crossings == len(rows)
