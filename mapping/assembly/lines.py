@@ -176,12 +176,15 @@ def _nearest(point: FloatArray, axis: FloatArray, others: list[FloatArray]) -> b
 def _full_height(members: list[Crossing], half_width: float, inspection: Inspection) -> list[Crossing]:
     """Crossings less those that only met the flank of what a neighbour met at its crest."""
     points = np.array([c.point for c in members])
-    heights = np.array([abs(c.height) for c in members])
+    heights, own = (np.array([abs(getattr(c, name)) for c in members]) for name in ("height", "half_width"))
+    sweeps = np.array([c.sweep for c in members])
     wide = 1.5 * max(half_width, min(inspection.pitch, 2 * half_width))
     full = []
     for c in members:
         gap = np.linalg.norm(points - c.point, axis=1)
-        needed = max(FULL_HEIGHT * heights[gap < wide].max(), CLOSE_HEIGHT * heights[gap < half_width].max())
+        # at a slant a sweep meets flanks as far off as it was disturbed
+        beside = (gap < wide) | ((sweeps == c.sweep) & (gap < own + c.half_width))
+        needed = max(FULL_HEIGHT * heights[beside].max(), CLOSE_HEIGHT * heights[gap < half_width].max())
         if abs(c.height) + 2 * c.height_sd >= needed:
             full.append(c)
     return full

@@ -33,7 +33,9 @@ def groups(crossings: Sequence[Crossing], inspection: Inspection, scale: float) 
         return i
 
     points = np.array([c.point for c in crossings])
-    pairs = _pairs(points, LONGEST_LINK * max(min(inspection.pitch, 1e300), scale))
+    # the next sweep meets a line that is crossed at a slant as many times farther on as the crossing is wider
+    slant = np.array([max(c.half_width / scale, 1.0) for c in crossings])
+    pairs = _pairs(points, LONGEST_LINK * max(min(inspection.pitch, 1e300), scale) * slant)
     for i, j in pairs:
         if root(i) != root(j) and linked(crossings[i], crossings[j], inspection, scale):
             parent[root(i)] = root(j)
@@ -43,12 +45,14 @@ def groups(crossings: Sequence[Crossing], inspection: Inspection, scale: float) 
     return sorted(members.values())
 
 
-def _pairs(points: FloatArray, reach: float) -> list[tuple[int, int]]:
-    """Pairs of points no further apart than `reach`, m, the nearest first."""
+def _pairs(points: FloatArray, reach: FloatArray) -> list[tuple[int, int]]:
+    """Pairs of points (N, 3) no further apart than both of them reach (N,), m, the nearest first."""
     from scipy.spatial import cKDTree
 
-    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    pairs = cKDTree(points).query_pairs(float(reach.max()), output_type="ndarray")
     distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    near = distance <= reach[pairs].min(axis=1)
+    pairs, distance = pairs[near], distance[near]
     return [(int(i), int(j)) for i, j in pairs[np.lexsort((pairs[:, 1], pairs[:, 0], distance))]]
 
 

@@ -1,4 +1,4 @@
-"""Lines with a flat top or floor that rows to and fro cross at a slant are told as they are under rows across them."""
+"""Lines that rows cross at a slant, or run along and hardly cross, are told as they are under rows across them."""
 
 from __future__ import annotations
 
@@ -48,3 +48,25 @@ def test_a_slot_is_as_deep_as_its_floor(tmp_path: Path, degrees: float) -> None:
     assert slot.kind == "groove"
     assert slot.height.median == pytest.approx(-0.2e-3, abs=1e-6)
     assert slot.width.median == pytest.approx(1.7e-3, abs=10e-6)
+
+
+def rows_along_a_groove(folder: Path, shift: float, seed: int = 3) -> ObjectModel:
+    """The model of rows 1.5 mm apart over a deep groove of 0.5 mm that runs from row to row at 2.9 degrees; its place
+    aside is moved by a shift, m."""
+    tip, width, slant = 1.5e-3, 0.5e-3, np.radians(2.9)
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(0.0, 0.1, 0.2e-3), np.arange(1.5e-3, 13.6e-3, 1.5e-3)))
+    aside = np.abs((y - 7.5e-3 - shift) * np.cos(slant) - (x - 0.05) * np.sin(slant))
+    z = np.sqrt(tip**2 - np.clip(0.5 * width - aside, 0.0, None) ** 2) - tip
+    z += np.random.default_rng(seed).normal(0.0, 1.5e-6, len(z))
+    table = folder / "along.csv"
+    np.savetxt(table, 1e3 * np.column_stack([x, y, z]), fmt="%.5f", delimiter=",", header="x [mm],y [mm],z [mm]")
+    return analyze(table, tip_radius=tip, quick=True).model
+
+
+def test_a_groove_between_rows_that_hardly_cross_it_is_one_line(tmp_path: Path) -> None:
+    (groove,) = rows_along_a_groove(tmp_path, 0.3e-3)
+    assert groove.kind == "groove" and groove.evidence.crossings >= 3
+    assert groove.width.median == pytest.approx(0.5e-3, rel=0.05)
+    assert groove.length.censored and 60e-3 < groove.length.low < 0.1
+    way = groove.axis[-1] - groove.axis[0]
+    assert abs(np.degrees(np.arctan(way[1] / way[0]))) == pytest.approx(2.9, abs=0.05)
