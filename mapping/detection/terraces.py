@@ -83,28 +83,31 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
     own = np.abs(smooth[:, None] - levels)
     # bins finer than the sampling are filled in: these scatter by nothing
     noise = neighbour_scatter(profile.height[np.diff(profile.first) > 0])
-    runs = _runs(own.argmin(axis=1), own.min(axis=1) < FEATURE_RESIDUAL_SDS * noise, reach)
+    on = FEATURE_RESIDUAL_SDS * noise
+    # what is as near to a level on an arc of the ball, whose top it may be, and as far again as means reach
+    passed = int((2.0 * np.sqrt(tip_radius * on) + 2.0 * MEAN * tip_radius) / profile.spacing)
+    runs = _runs(own.argmin(axis=1), own.min(axis=1) < on, reach, max(passed, TERRACE_BINS))
     runs = _up_to_edges(runs, reach, smooth, levels)
     # a long way from one level to the next is no edge, and the base's levels are none of this sweep's
     if not runs or any(onward - end > reach for (_, end, _), (onward, _, _) in itertools.pairwise(runs)):
         return Terraced(profile)
     # an arc is higher than the noise only so far from its end, and the means come a little nearer
-    beside = int((MEAN * tip_radius + np.sqrt(2 * tip_radius * FEATURE_RESIDUAL_SDS * noise)) / profile.spacing) + 1
-    # a part of every terrace is left, however coarse the bins and strong the noise
-    beside = min(beside, reach // 2)
+    rounded = int((MEAN * tip_radius + np.sqrt(2 * tip_radius * on)) / profile.spacing) + 1
     height, edges = profile.height - levels[runs[0][2]], []
     level = np.full(len(height), levels[runs[-1][2]])
     for (begin, end, here), (onward, last, there) in itertools.pairwise(runs):
         height[onward:] += levels[here] - levels[there]
-        # the way from one to the other is no path over a base: the terrace behind it stands in, with its noise
-        behind = min(last, onward + beside)
-        way = np.arange(max(begin, end - beside), behind)
+        # the way from one to the other is no path over a base: the terrace behind it stands in, with its noise; a part
+        # of every terrace is left, however short it is, coarse the bins and strong the noise
+        behind = onward + min(rounded, (last - onward) // 2)
+        way = np.arange(end - min(rounded, (end - begin) // 2), behind)
         level[0 if begin == runs[0][0] else begin : end] = levels[here]
         level[way] = np.nan
         height[way] = np.pad(height[behind:last], (len(way), 0), mode="symmetric")[: len(way)]
         # details of the two terraces are none of the edge's
         plain = profile.height.copy()
-        for ground, detail in ((here, slice(begin, end - reach)), (there, slice(onward + reach, last))):
+        farther = slice(begin, max(begin, end - reach)), slice(min(onward + reach, last), last)
+        for ground, detail in zip((here, there), farther, strict=True):
             stands = np.abs(plain[detail] - levels[ground]) >= FEATURE_RESIDUAL_SDS * noise
             plain[detail][stands] = levels[ground]
         start, stop = max(begin, end - EDGE_TERRACES * reach), min(last, onward + EDGE_TERRACES * reach)
@@ -114,8 +117,12 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
     return Terraced(replace(profile, height=height), tuple(edges), level)
 
 
-def _runs(level: IntArray, on: BoolArray, shortest: float) -> list[tuple[int, int, int]]:
-    """(first bin, past-last bin, level) of the stretches on one level; details interrupt none of them."""
+def _runs(level: IntArray, on: BoolArray, shortest: float, passed: int) -> list[tuple[int, int, int]]:
+    """(first bin, past-last bin, level) of the stretches on one level; details interrupt none of them.
+
+    What is no longer than `shortest` is a detail of the level on both its sides, unless these are two: then it is a
+    stair, if it is longer than what is `passed` on the way from one to the other.
+    """
     at = np.flatnonzero(on)
     if not len(at):
         return []
@@ -128,7 +135,13 @@ def _runs(level: IntArray, on: BoolArray, shortest: float) -> list[tuple[int, in
             runs[-1] = (runs[-1][0], end, own)
         else:
             runs.append((begin, end, own))
-    return runs
+    stairs = [
+        piece
+        for (_, end, here), (onward, _, there) in itertools.pairwise(runs)
+        for piece in pieces
+        if end <= piece[0] and piece[1] <= onward and piece[1] - piece[0] > passed and piece[2] not in (here, there)
+    ]
+    return sorted([*runs, *stairs])
 
 
 def _up_to_edges(

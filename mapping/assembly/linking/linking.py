@@ -57,7 +57,8 @@ def _pairs(points: FloatArray, reach: FloatArray) -> list[tuple[int, int]]:
 
 
 def linked(a: Crossing, b: Crossing, inspection: Inspection, scale: float) -> bool:
-    """True if both may be the same line: like heights, and no inspected place between them is clearly lower."""
+    """True if both may be the same line: like heights, and no inspected place between them is clearly lower; steps that
+    rise from one level."""
     low, high = sorted((abs(a.height), abs(b.height)))
     if low < HEIGHT_RATIO * high or a.normal @ b.normal < 0:
         return False
@@ -66,8 +67,19 @@ def linked(a: Crossing, b: Crossing, inspection: Inspection, scale: float) -> bo
     if a.is_step and low < 0.5 * high:
         return False
     if a.is_step:
-        return True
+        return abs(_foot_of_step(a, inspection) - _foot_of_step(b, inspection)) < 0.5 * low
     return not inspection.denies(between(a.point, b.point, scale), np.sign(a.height) * low, FELT_REACH * scale)
+
+
+def _foot_of_step(step: Crossing, inspection: Inspection) -> float:
+    """Height that a step rises from, m: of its sweep's places before it, as far off as it was disturbed and once more,
+    or of the nearest of them."""
+    own = inspection.of_sweep(step.sweep)
+    before = (step.point - inspection.points[own]) @ uphill(step) - step.half_width
+    own, before = own[before > 0.0], before[before > 0.0]
+    if not len(own):
+        return 0.0
+    return float(np.median(inspection.height[own[before <= max(step.half_width, before.min())]]))
 
 
 def uphill(crossing: Crossing) -> FloatArray:

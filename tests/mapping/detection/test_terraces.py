@@ -127,3 +127,24 @@ def test_a_slot_too_narrow_for_a_terrace_has_its_edges_at_its_rims() -> None:
     for line in places(detections, "step up", "step down"):
         assert line == pytest.approx([-2.5e-3, 2.5e-3], abs=0.45e-3)
     assert len(detections.crossings) == 2 * LINES
+
+
+@pytest.mark.parametrize("second", [0.2e-3, -0.12e-3])
+def test_a_short_terrace_between_two_others_is_a_stair_and_its_edges_are_two_steps(second: float) -> None:
+    """Three radii wide: as a detail of one level it would have to lie on the same level on both sides."""
+
+    def height(x: FloatArray) -> FloatArray:
+        top = 0.2e-3 + second
+        if second > 0.0:
+            return np.maximum(step_height(x, 0.2e-3, TIP), step_height(x - 3e-3, top, TIP))
+        bar = np.minimum(step_height(x, 0.2e-3, TIP), step_height(3e-3 - x, 0.2e-3, TIP))
+        return np.maximum(bar, step_height(x, top, TIP))
+
+    trace = raster(height)
+    base = fit_base(trace)
+    detections = detect(trace, base)
+    assert all(line == pytest.approx([0.0, 3e-3], abs=0.7e-3) for line in places(detections, "step up", "step down"))
+    steps = sorted(assemble(detections, trace, base, proposals=()), key=lambda step: float(step.axis[:, 0].mean()))
+    assert [step.kind for step in steps] == ["step", "step"]
+    assert [step.height.median for step in steps] == pytest.approx([0.2e-3, abs(second)], rel=0.03)
+    assert all(np.ptp(step.axis[:, 0]) < 0.5e-3 for step in steps)
