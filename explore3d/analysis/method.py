@@ -5,7 +5,7 @@ The order of the stages stands in build_model.py.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,7 @@ from mapping.assembly import (
     Inspections,
     along_sweeps,
     assemble,
+    felt_alone,
     inspected_for,
     why_none_sought,
     without_wide,
@@ -648,7 +649,17 @@ def why_no_chain(work: Work) -> str | None:
 
 def believed(work: Work, share: Share) -> None:
     """Without what all sweeps together hardly speak for: a false alarm that later sweeps passed by."""
-    unlikely = dropped_features([feature for feature in work.features if not feature.evidence.likely])
+    told = [feature for feature in work.features if feature.evidence.likely]
+    alone = _felt_alone(work, told)
+    unlikely = dropped_features(
+        [
+            feature
+            for feature in work.features
+            if not feature.evidence.likely
+            and not any(distances(feature.axis, each.axis).min() < 0.5 * each.width.high for each in alone)
+        ]
+    )
+    work.features = (*work.features, *alone)
     lone = dropped_crossings(work.detections.crossings, work.features, work.trace.tip_radius)
     work.dropped = (*unlikely, *lone)
     for each in unlikely:
@@ -666,6 +677,14 @@ def believed(work: Work, share: Share) -> None:
         work.features = tuple(_doubted(feature, work.backlash, tip) for feature in work.features)
     if work.yielding is not None:
         work.features = tuple(_pressed(feature, work.yielding, work.laid) for feature in work.features)
+
+
+def _felt_alone(work: Work, told: Sequence[Feature]) -> list[Feature]:
+    """What single sweeps show beside what is told; over a given base that may be off, or by a log that has been thinned
+    out, they tell nothing of it, and each sweep of a profile has told its sections already."""
+    if not work.detections.crossings or work.log.detections or work.base.kind in ("mesh", "profile"):
+        return []
+    return felt_alone(work.detections, work.laid, told)
 
 
 def _pressed(feature: Feature, finger: Yielding, trace: Trace) -> Feature:

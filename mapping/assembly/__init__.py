@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     )
     from mapping.assembly.faint_features import why_none_sought as why_none_sought, with_faint_lines as with_faint_lines
     from mapping.assembly.faint_lines import load_faint_kernel as load_faint_kernel
+    from mapping.assembly.free.felt_alone import felt_alone as felt_alone
     from mapping.assembly.free.free_sections import without_wide as without_wide
     from mapping.assembly.linking.inspection import Inspections as Inspections
 
@@ -25,6 +26,7 @@ _PUBLIC = {
     "assemble": ("assemble", "inspected_for", "place_spacing"),
     "faint_features": ("why_none_sought", "with_faint_lines"),
     "faint_lines": ("load_faint_kernel",),
+    "free.felt_alone": ("felt_alone",),
     "free.free_sections": ("without_wide",),
     "linking.inspection": ("Inspections",),
 }

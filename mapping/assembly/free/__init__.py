@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from mapping.assembly.free.felt_alone import felt_alone as felt_alone
     from mapping.assembly.free.free_sections import (
         FreeSection as FreeSection,
         free_sections as free_sections,
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from mapping.assembly.free.section import CORE as CORE
 
 _PUBLIC = {
+    "felt_alone": ("felt_alone",),
     "free_sections": ("FreeSection", "free_sections", "free_spot"),
     "mean_section": ("mean_sizes",),
     "outline": ("WIDER_THAN_CREST",),

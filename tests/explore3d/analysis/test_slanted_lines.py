@@ -50,23 +50,44 @@ def test_a_slot_is_as_deep_as_its_floor(tmp_path: Path, degrees: float) -> None:
     assert slot.width.median == pytest.approx(1.7e-3, abs=10e-6)
 
 
-def rows_along_a_groove(folder: Path, shift: float, seed: int = 3) -> ObjectModel:
-    """The model of rows 1.5 mm apart over a deep groove of 0.5 mm that runs from row to row at 2.9 degrees; its place
-    aside is moved by a shift, m."""
-    tip, width, slant = 1.5e-3, 0.5e-3, np.radians(2.9)
-    x, y = (each.ravel() for each in np.meshgrid(np.arange(0.0, 0.1, 0.2e-3), np.arange(1.5e-3, 13.6e-3, 1.5e-3)))
+def rows_along_a_groove(folder: Path, degrees: float, shift: float = 0.0, denied: bool = False) -> ObjectModel:
+    """The model of rows 1.5 mm apart over a deep groove of 0.5 mm that runs at a slant to them.
+
+    Args:
+        degrees: of the slant.
+        shift: by which its middle is beside a row, m.
+        denied: True if that row was swept once more, and nothing was felt then.
+    """
+    tip, width, slant = 1.5e-3, 0.5e-3, np.radians(degrees)
+    rows = [*np.arange(1.5e-3, 13.6e-3, 1.5e-3), *([7.5e-3] if denied else [])]
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(0.0, 0.1, 0.2e-3), rows))
+    sweep = np.repeat(np.arange(len(rows)), 500)
     aside = np.abs((y - 7.5e-3 - shift) * np.cos(slant) - (x - 0.05) * np.sin(slant))
     z = np.sqrt(tip**2 - np.clip(0.5 * width - aside, 0.0, None) ** 2) - tip
-    z += np.random.default_rng(seed).normal(0.0, 1.5e-6, len(z))
+    z = np.where(sweep == 9, 0.0, z) + np.random.default_rng(3).normal(0.0, 1.5e-6, len(z))
     table = folder / "along.csv"
-    np.savetxt(table, 1e3 * np.column_stack([x, y, z]), fmt="%.5f", delimiter=",", header="x [mm],y [mm],z [mm]")
+    columns = np.column_stack([sweep, 1e3 * np.column_stack([x, y, z])])
+    np.savetxt(table, columns, fmt="%.5f", delimiter=",", header="sweep,x [mm],y [mm],z [mm]", comments="")
     return analyze(table, tip_radius=tip, quick=True).model
 
 
 def test_a_groove_between_rows_that_hardly_cross_it_is_one_line(tmp_path: Path) -> None:
-    (groove,) = rows_along_a_groove(tmp_path, 0.3e-3)
+    (groove,) = rows_along_a_groove(tmp_path, 2.9, 0.3e-3)
     assert groove.kind == "groove" and groove.evidence.crossings >= 3
     assert groove.width.median == pytest.approx(0.5e-3, rel=0.05)
     assert groove.length.censored and 60e-3 < groove.length.low < 0.1
     way = groove.axis[-1] - groove.axis[0]
     assert abs(np.degrees(np.arctan(way[1] / way[0]))) == pytest.approx(2.9, abs=0.05)
+
+
+def test_what_one_row_alone_shows_plainly_is_there_with_bounds_and_a_remark(tmp_path: Path) -> None:
+    (dip,) = rows_along_a_groove(tmp_path, 1.0)
+    assert dip.kind == "pit" and dip.evidence.log_odds > 1000.0
+    assert dip.details.misfit and "a line along that sweep" in dip.details.misfit
+    assert dip.height.censored and dip.height.median == pytest.approx(-21e-6, abs=2e-6)
+    assert dip.width.bounded and 0.4e-3 < dip.width.low < 0.51e-3 and dip.width.high > 10e-3
+
+
+def test_what_one_sweep_shows_and_the_next_over_the_same_place_does_not_is_nothing(tmp_path: Path) -> None:
+    model = rows_along_a_groove(tmp_path, 1.0, denied=True)
+    assert not model.features and model.dropped
