@@ -205,7 +205,7 @@ def _improved(
     """The features of one block, as they are or better, and the configuration of the highest odds."""
     group = block.features
     if _is_plain(start):
-        return group, start
+        return _bent_as_fitted(group, start, around), start
     points = [c.point for c in block.crossings if c.kind == "convex"]
     points += [
         point for feature in group if kind_of(feature).line and kind_of(feature).sign > 0 for point in feature.axis
@@ -218,11 +218,25 @@ def _improved(
     if (adds and not found.best.fits and not _pays_beside_misfit(found)) or (
         set(found.accepted) <= CHOSEN_LATER and found.best.kinds == found.start.kinds
     ):
-        felt = [_felt_by_runs(feature, found.start.runs(k)) for k, feature in enumerate(group)]
+        laid = _bent_as_fitted(group, found.start, around)
+        felt = [_felt_by_runs(feature, found.start.runs(k)) for k, feature in enumerate(laid)]
         return [_with_odds(feature, odds if found.best.fits else (), noted) for feature in felt], found.best
     algorithms = group[0].evidence.algorithms if group else ()
     features = [_with_odds(feature, odds, noted) for feature in _described(found.best, around, algorithms)]
     return _meeting(features, around.trace.tip_radius), found.best
+
+
+def _bent_as_fitted(group: Sequence[Feature], start: Configuration, around: Surroundings) -> list[Feature]:
+    """The features as the rules left them, but of a configuration that leaves no more than noise the lines that bend as
+    they are fitted: through coarse rows the rules lay a polygon, which is off its course between them."""
+    bent = [kind_of(feature).line and len(feature.axis) > 2 for feature in group]
+    if not start.fits or not any(bent):
+        return list(group)
+    told = dict(zip(itertools.compress(range(len(group)), start.stands), _described(start, around), strict=True))
+    return [
+        replace(told[k], evidence=feature.evidence) if bent[k] and k in told else feature
+        for k, feature in enumerate(group)
+    ]
 
 
 def _pays_beside_misfit(found: Account) -> bool:

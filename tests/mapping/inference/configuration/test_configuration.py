@@ -64,6 +64,11 @@ def test_a_ring_is_closed_where_a_line_with_ends_fits_as_well() -> None:
     assert result["right"], result
 
 
+def test_a_ring_under_coarse_rows_is_told_along_its_fitted_course() -> None:
+    result = trial("O-ring", "none", "one way", FIRST_BUILT_WITH)  # the rules' polygon of nine corners is 6.8 mm off
+    assert result["right"], result
+
+
 @pytest.mark.parametrize(("body", "off"), [("burred groove", 4e-6), ("wire over a step", 90e-6)])
 def test_details_together_leave_what_the_ball_feels_of_them(body: str, off: float) -> None:
     # the flank of two crests within a bin is off by 0.02 of their 0.14 mm; the wire climbs the step over half a
