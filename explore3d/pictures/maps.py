@@ -14,13 +14,11 @@ from explore3d.pictures.chart import FONT_SIZE, drawing, image, pixels_png, text
 from explore3d.pictures.object import SUPERSAMPLING, cameras_for, pictured, shifted, view_directions
 from explore3d.pictures.render import Body, Picture, render
 from mapping import BoolArray, Feature, FloatArray, IntArray, Surface, length_unit
-from mapping.geometry.curvature import TOLD_SIDE
+from mapping.geometry.curvature import TOLD_SIDE, Neighbours
 from mapping.geometry.mesh import arclengths, directions, resample
 from mapping.model import feature_mesh
 
 if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
-
     from mapping.estimate.envelope import Estimate
     from mapping.geometry.curvature import Curvature
 
@@ -271,34 +269,36 @@ def _seen(picture: Picture, block: int) -> tuple[FloatArray, FloatArray, BoolArr
 def _read(
     places: FloatArray, points: FloatArray, values: FloatArray, sides: tuple[FloatArray, FloatArray] | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """(M, 4) k1, k2 and their standard deviations at places (M, D), and (M,) how far the nearest point is.
+    """(M, 4) k1, k2 and their standard deviations at places (M, 2 or 3), and (M,) how far the nearest point is.
 
-    Means over the READ_FROM nearest points (N, D), weighed down to nothing at the last of them, so that they change
-    without a jump; neighbours that contradict each other make a value unsure.
+    Means over the READ_FROM nearest points (N, 2 or 3), weighed down to nothing at the last of them, so that they
+    change without a jump; neighbours that contradict each other make a value unsure.
 
     Args:
         values: (N, 4) k1, k2 and their standard deviations.
         sides: normals of places and points: what faces away does not count. None: all does.
     """
-    from scipy.spatial import cKDTree
-
-    count = min(READ_FROM, len(points))
-    if count == 0:
+    if len(points) == 0:
         return np.zeros((len(places), 4)), np.full(len(places), np.inf)
-    tree, read, apart = cKDTree(points), np.empty((len(places), 4)), np.empty(len(places))
+    places, points = (np.pad(each, ((0, 0), (0, 3 - each.shape[1]))) for each in (places, points))
+    near, read, apart = Neighbours(points), np.empty((len(places), 4)), np.empty(len(places))
     for first in range(0, len(places), READ_AT_ONCE):
         part = slice(first, first + READ_AT_ONCE)
         own = None if sides is None else (sides[0][part], sides[1])
-        read[part], apart[part] = _read_some(tree, count, places[part], values, own)
+        which = near.query(places[part], min(READ_FROM, len(points)))
+        read[part], apart[part] = _read_some(places[part], points, which, values, own)
     return read, apart
 
 
 def _read_some(
-    tree: cKDTree, count: int, places: FloatArray, values: FloatArray, sides: tuple[FloatArray, FloatArray] | None
+    places: FloatArray,
+    points: FloatArray,
+    which: IntArray,
+    values: FloatArray,
+    sides: tuple[FloatArray, FloatArray] | None,
 ) -> tuple[FloatArray, FloatArray]:
-    """`_read` from so many points of a tree at once."""
-    apart, which = tree.query(places, k=count)
-    apart, which = np.reshape(apart, (len(places), count)), np.reshape(which, (len(places), count))
+    """`_read` from those points (M, K) that are nearest, nearest first."""
+    apart = np.linalg.norm(points[which] - places[:, None], axis=2)
     weights = (1.0 - (apart / np.maximum(apart[:, -1:], np.finfo(float).tiny)) ** 2) ** 2 + 1e-9
     nearest = apart[:, 0]
     if sides is not None:
