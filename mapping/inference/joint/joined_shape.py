@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -70,18 +70,18 @@ class JoinedShape:
         """(W, n) heights over the base's trace, m."""
         theta = np.hstack([theta, np.tile(self.theirs, (len(theta), 1))]) if self.held else theta
         own = [theta[:, columns] for columns in _in_a_row(self._all)]
-        hollows = [_Distinct.of(self._all[k], own[k]) for k in self._varied if not stands_out(self._all[k])]
+        hollows = [_Distinct.of(self._all[k].templates, own[k]) for k in self._varied if not stands_out(self._all[k])]
         ground = sum((each.heights[0] for each in hollows), self._held_ground)
         felt = np.tile(ground, (len(theta), 1))
         for hollow in hollows:
             felt[hollow.other] += hollow.heights[hollow.which[hollow.other]] - hollow.heights[0]
         if self._crossing is not None:
-            rows = {k: len(theta) if k in self._varied else 1 for k in self._grooves}
-            taken = [groove.taken(own[k][: rows[k]]) for k, groove in self._grooves.items()]
-            felt += self._crossing.heights(taken, next(iter(self._grooves.values())).tip_radius)
+            crossed = _Distinct.of(self._crossed, np.hstack([own[k] for k in self._grooves]))
+            felt += crossed.heights[crossed.which]
         # a crest beside a hollow holds the ball that sinks into it: crests are known as far down as it does
         sunk = max(-float(felt.min(initial=0.0)), 0.0)
-        crests = [_Distinct.of(self._all[k], piece) for k in self._varied for piece in self._crests(k, own, sunk)]
+        every = ((self._all[k], piece) for k in self._varied for piece in self._crests(k, own, sunk))
+        crests = [_Distinct.of(shape.templates, piece) for shape, piece in every]
         crests += [_Distinct.same(heights, len(theta)) for heights in self._held_crests(own, sunk)]
         _rest_on(felt, crests, sunk)
         # part by part: numpy's mean over so short an axis takes four times as long
@@ -105,6 +105,15 @@ class JoinedShape:
             return None
         crossing = Crossing.of(list(self._grooves.values()))
         return crossing if len(crossing.bin) else None
+
+    def _crossed(self, theta: FloatArray) -> FloatArray:
+        """(W, n) what the grooves leave together more than the sum, m, of their parameters (W, P) in a row."""
+        assert self._crossing is not None
+        grooves = list(self._grooves.values())
+        own = zip(self._grooves, _in_a_row(grooves), strict=True)
+        rows = [theta[: len(theta) if k in self._varied else 1, columns] for k, columns in own]
+        taken = [groove.taken(each) for groove, each in zip(grooves, rows, strict=True)]
+        return self._crossing.heights(taken, grooves[0].tip_radius)
 
     @cached_property
     def _held_ground(self) -> FloatArray:
@@ -190,7 +199,7 @@ def _in_a_row(shapes: Sequence[Shape]) -> list[slice]:
 
 @dataclass(frozen=True, eq=False)
 class _Distinct:
-    """Heights of one shape: most rows of a difference quotient have the same, and differ in the others' parameters.
+    """Heights of some shapes: most rows of a difference quotient have the same, and differ in the others' parameters.
 
     Args:
         heights: (U, n) of parameters that differ, the commonest ones first, m; others may be there twice.
@@ -203,16 +212,17 @@ class _Distinct:
     other: IntArray
 
     @classmethod
-    def of(cls, shape: Shape, theta: FloatArray) -> _Distinct:
+    def of(cls, templates: Callable[[FloatArray], FloatArray], theta: FloatArray) -> _Distinct:
+        """Of what gives heights (M, n) for parameters (M, P), and parameters (W, P)."""
         if (theta == theta[0]).all():
-            return cls.same(shape.templates(np.ascontiguousarray(theta[:1]))[0], len(theta))
+            return cls.same(templates(np.ascontiguousarray(theta[:1]))[0], len(theta))
         # of a batch of difference quotients its first or its last row is that of most
         alike = max(((theta == row).all(axis=1) for row in (theta[0], theta[-1])), key=np.count_nonzero)
         other = np.flatnonzero(~alike)
         which = np.zeros(len(theta), dtype=np.int64)
         which[other] = 1 + np.arange(len(other))
         rows = np.concatenate([theta[alike.argmax()][None], theta[other]])
-        return cls(shape.templates(np.ascontiguousarray(rows)), which, other)
+        return cls(templates(np.ascontiguousarray(rows)), which, other)
 
     @classmethod
     def same(cls, heights: FloatArray, count: int) -> _Distinct:

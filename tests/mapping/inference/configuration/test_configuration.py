@@ -35,7 +35,7 @@ from mapping.inference.configuration.configuration import (
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood, window_of
 from mapping.inference.configuration.proposals import chained, joined, smoother, straight_lines
 from mapping.inference.configuration.search import searched
-from mapping.inference.families import SmoothGrooveShape, Surroundings
+from mapping.inference.families import Crossing, SmoothGrooveShape, Surroundings
 from mapping.inference.joint import JoinedShape
 from mapping.instrument import Noise
 
@@ -95,6 +95,34 @@ def test_details_together_leave_what_the_ball_feels_of_them(body: str, off: floa
         theirs = np.concatenate([own for m, own in enumerate(start) if m != k])
         beside = JoinedShape([part.shape], len(place.window), PARTS_OF_BIN, [o.shape for o in others], theirs)
         assert np.abs(beside.templates(np.tile(start[k], (2, 1))) - felt).max() < 1e-15
+
+
+def test_where_grooves_cross_is_worked_out_once_for_all_that_differs_in_other_details(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    truth = {true.kind: _true(true) for true in classified_body("burred groove", FIRST_BUILT_WITH).truth}
+    groove, burr = truth["groove"], truth["ridge"]
+    middle = groove.axis.mean(axis=0)
+    across = replace(groove, axis=middle + np.cross(groove.axis - middle, [0.0, 0.0, 1.0]))
+    place = _weighed_on("burred groove", [groove, burr])
+    parts = [part_of(feature, place, 1) for feature in (groove, across, burr)]
+    shape = JoinedShape([part.shape for part in parts], len(place.window), PARTS_OF_BIN)
+    theta = np.concatenate([part.start for part in parts])
+    batch = theta + np.diag(shape.step)
+    rows, heights = [], Crossing.heights
+
+    def counted(crossing: Crossing, taken: Any, tip: float) -> np.ndarray:
+        rows.append(max(len(each[-1]) for each in taken))
+        return heights(crossing, taken, tip)
+
+    monkeypatch.setattr(Crossing, "heights", counted)
+    together = shape.templates(batch)
+    assert rows == [1 + len(theta) - len(parts[2].start)]
+    for row, found in zip(batch, together, strict=True):
+        np.testing.assert_allclose(found, shape.templates(row[None])[0], rtol=0.0, atol=1e-15)
+    # and there is something to work out
+    apart = sum(part.shape.templates(part.start[None])[0] for part in parts[:2])
+    assert np.abs(shape.templates(theta[None])[0] - apart.reshape(-1, PARTS_OF_BIN).mean(axis=1)).max() > 1e-5
 
 
 @pytest.mark.slow
