@@ -91,6 +91,8 @@ ABSORBED, PART, DEVIATION_MAP, YIELDING = "part of the form", "part of the trace
 TOO_LITTLE_FELT = "too little was felt to hold the model against it: a wrong one would not be named"
 # What a stage could not do although it was needed
 FAILED = "could not be done"
+# Why what is fainter than single sweeps show is not sought
+SHOWS_ALL = "a single sweep shows all that the scene asks for"
 _TOO_WIDE = "stands off the base and is wider than fine features are: only its edges are sought"
 # Of these so many are described one by one
 MOST_STANDING = 5
@@ -241,6 +243,11 @@ class Work:
     def smallest_feature(self) -> float | None:
         """Height of the smallest feature that the scene asks for, m, or None."""
         return None if self.scene is None else self.scene.smallest
+
+    @property
+    def shows_all_asked(self) -> bool:
+        """True if a single sweep shows features as low as the scene asks for."""
+        return self.smallest_feature is not None and self.detections.detection_limit <= self.smallest_feature
 
     def wants(self, name: str) -> bool:
         """True if the part of a stage with this name was asked for."""
@@ -574,21 +581,27 @@ def why_no_lines(work: Work) -> str:
     """Why a trace without a single crossing cannot, or need not, hold what only many sweeps together show."""
     if work.deviation is not None and work.deviation.beyond_repair:
         return "the model is shown to be wrong beyond repair"
-    asked, limit = work.smallest_feature, work.detections.detection_limit
     if work.detections.crossings:
         return ""
-    if asked is not None and limit <= asked:
-        return "nothing was detected, though a single sweep shows all that the scene asks for"
+    if work.shows_all_asked:
+        return f"nothing was detected, though {SHOWS_ALL}"
     why_not = why_none_sought(work.detections, work.trace, work.base)
     return f"nothing was detected, and lines too faint for one sweep are not sought: {why_not}" if why_not else ""
 
 
+def why_no_faint_lines(work: Work) -> str | None:
+    """Lines too low for any one sweep are sought where the scene asks for what is so low; a part of the grammar."""
+    if why_no_lines(work) and not work.stages.is_forced("grammar"):
+        return None
+    return SHOWS_ALL if work.shows_all_asked else ""
+
+
 def assembled(work: Work, share: Share) -> None:
-    """Features from the crossings."""
-    rate = work.settings.false_alarms_per_metre
-    work.inspections = inspected_for(work.detections, work.laid, work.base)
+    """Features from the crossings, and lines that no single sweep shows."""
+    rate, found, faint = work.settings.false_alarms_per_metre, work.detections, work.wants("faint lines")
+    work.inspections = inspected_for(found, work.laid, work.base, faint=faint)
     work.features = assemble(
-        work.detections, work.laid, work.base, false_alarms_per_metre=rate, inspections=work.inspections
+        found, work.laid, work.base, false_alarms_per_metre=rate, faint=faint, inspections=work.inspections
     )
 
 

@@ -23,6 +23,7 @@ OPTIONAL_STAGES = (
     "algorithms 1 and 2",
     "injected crests",
     "grammar",
+    "faint lines",
     "posterior",
     "long chain",
     "estimated surface",

@@ -144,11 +144,22 @@ def test_without_a_crossing_a_wire_that_only_many_sweeps_show_is_found_all_the_s
 
 def test_where_each_sweep_shows_all_that_is_asked_for_no_fainter_lines_are_sought_and_none_would_be_found(record):
     path = record(flat, 0.1e-3, count=12, scene=EMPTY.read_text())
-    bare, forced = analyze(path), analyze(path, force=["grammar"])
+    bare, forced = analyze(path), analyze(path, force=["grammar", "faint lines"])
     assert "asks for" in left(bare)["grammar"].reason
     assert bare.detections.detection_limit < bare.scene.survey.smallest_feature
     assert "grammar" in forced.timings
     assert bare.model.features == forced.model.features == ()
+
+
+@pytest.mark.slow
+def test_beside_what_single_sweeps_show_fainter_lines_are_sought_only_if_the_scene_asks_for_them(record):
+    path = record(wire(), 0.1e-3, count=6, scene=EMPTY.read_text())
+    plain, forced = analyze(path), analyze(path, force=["faint lines"])
+    assert "asks for" in left(plain)["faint lines"].reason
+    assert "faint lines" not in left(forced)
+    assert [f.height for f in plain.model.features] == [f.height for f in forced.model.features] != []
+    lower = EMPTY.read_text().replace('smallest_feature = "0.3 mm"', 'smallest_feature = "0.05 mm"')
+    assert "faint lines" not in left(analyze(record(wire(), 0.1e-3, count=6, scene=lower)))
 
 
 def test_a_stage_that_there_is_not_cannot_be_forced_and_the_possible_ones_are_named(wired):
