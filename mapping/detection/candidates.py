@@ -12,7 +12,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray
 from mapping.base import SweepHeights
 from mapping.detection.cap_fit import PHYSICAL, Disturbance, fit_cap
-from mapping.detection.empirical_null import NullScale, sampling, seen
+from mapping.detection.empirical_null import NullScale, sampling, seen, seen_by_each
 from mapping.detection.filters import Bank
 from mapping.instrument import Noise, running_mean
 
@@ -224,11 +224,12 @@ def _certainties(profile: SweepHeights, bank: Bank, null: NullScale | None) -> F
     if sampled is None and null is None:
         return None
     out = np.ones((len(bank.filters), len(profile.height)))
-    for k in range(bank.fitting(len(profile.height), _longest(profile.height, bank))):
-        if null is not None:
+    count = bank.fitting(len(profile.height), _longest(profile.height, bank))
+    if null is not None:
+        for k in range(count):
             out[k] /= null.along(k)
-        elif sampled is not None:
-            out[k] /= seen(sampled, bank.filters[k].half_width / bank.spacing)
+    elif sampled is not None:
+        out[:count] /= seen_by_each(sampled, bank.widths[:count] / bank.spacing)
     return out
 
 

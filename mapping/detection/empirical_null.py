@@ -24,7 +24,7 @@ from mapping import BoolArray, FloatArray
 from mapping.base import SweepHeights
 from mapping.detection.filters import Bank
 from mapping.detection.local_level import LOG_VARIANCE_PER_BIN, excess, local_levels
-from mapping.instrument import MAD_TO_SD, Noise, robust_sd, running_mean
+from mapping.instrument import MAD_TO_SD, Noise, robust_sd, running_mean, running_means
 
 # The scale of unit outputs is read from their median absolute value, which what is no noise in less than half of a cell
 # shifts little. Variance of the logarithm of the variance so read in a cell of one half-width; simulated with white and
@@ -299,9 +299,14 @@ def sampling(profile: SweepHeights, bank: Bank) -> FloatArray | None:
 
 def seen(local: FloatArray, bins: float) -> FloatArray:
     """(n,) by which the sd of a filter of so many bins' half-width differs where bins have these variances (n,)."""
+    return np.asarray(seen_by_each(local, np.array([bins]))[0])
+
+
+def seen_by_each(local: FloatArray, bins: FloatArray) -> FloatArray:
+    """(F, n) the same for filters of half-widths (F,)."""
     if (local == local[0]).all():
-        return np.full(len(local), np.sqrt(local[0]))
-    return np.sqrt(running_mean(local, max(1, int(0.5 * bins))))
+        return np.full((len(bins), len(local)), np.sqrt(local[0]))
+    return np.sqrt(running_means(local, np.maximum(0.5 * bins, 1.0).astype(np.int64)))
 
 
 def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank, k: int, least: float) -> FloatArray:

@@ -5,7 +5,12 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.instrument.averaging import Means as Means, RunMeans as RunMeans, running_mean as running_mean
+    from mapping.instrument.averaging import (
+        Means as Means,
+        RunMeans as RunMeans,
+        running_mean as running_mean,
+        running_means as running_means,
+    )
     from mapping.instrument.block_likelihood import (
         Blocks as Blocks,
         NoiseFit as NoiseFit,
@@ -32,7 +37,7 @@ if TYPE_CHECKING:
     from mapping.instrument.unshared_heights import ROWS_THAT_SHARE as ROWS_THAT_SHARE, Row as Row, unshared as unshared
 
 _PUBLIC = {
-    "averaging": ("Means", "RunMeans", "running_mean"),
+    "averaging": ("Means", "RunMeans", "running_mean", "running_means"),
     "block_likelihood": ("Blocks", "NoiseFit", "perturbed", "relative_sd"),
     "levels": ("Levels",),
     "noise_fit": ("fit_noise",),

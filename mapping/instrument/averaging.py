@@ -19,15 +19,14 @@ SECOND_DIFFERENCE = float(np.sqrt(12.0 / np.pi))
 
 def running_mean(values: FloatArray, half: int) -> FloatArray:
     """(N,) means over 2 half + 1 values (N,), over fewer at the ends."""
-    count, size, near = len(values), 2 * half + 1, min(half, len(values))
-    # sums up to each, as if there were zeros before and behind: slices, at half of the time of an index for each
-    sums = np.zeros(count + size)
-    np.cumsum(values, out=sums[half + 1 : half + 1 + count])
-    sums[half + 1 + count :] = sums[half + count]
-    means, there = sums[size:] - sums[:-size], np.full(count, size)
-    there[:near] -= np.arange(half, half - near, -1)
-    there[count - near :] -= np.arange(half - near + 1, half + 1)
-    return np.asarray(np.divide(means, there, out=means))
+    return np.asarray(running_means(values, np.array([half]))[0])
+
+
+def running_means(values: FloatArray, halves: IntArray) -> FloatArray:
+    """(K, N) the same for each of K halves."""
+    from mapping.instrument.averaging_kernels import means_about
+
+    return np.asarray(means_about(np.ascontiguousarray(values, dtype=np.float64), halves))
 
 
 @dataclass(frozen=True, eq=False)
