@@ -11,6 +11,9 @@ Reference: Serra, Image Analysis and Mathematical Morphology, 1982; the estimate
 
 from __future__ import annotations
 
+import itertools
+from typing import Any
+
 import numpy as np
 
 from mapping import FloatArray, IntArray
@@ -44,15 +47,19 @@ def rested_on(places: IntArray, inspection: Inspection, tip_radius: float, half_
     from scipy.spatial import cKDTree
 
     tried = _beside(places, inspection, half_width)
-    tree = cKDTree(inspection.points)
-    near = tree.query_ball_point(tried, half_width)
-    left, least = np.zeros(len(tried)), 0.5 * half_width**2 / (2.0 * tip_radius)
-    for k, balls in enumerate(near):
-        felt, away = inspection.height[balls], inspection.points[balls] - tried[k]
-        top = felt.max(initial=0.0)
-        if top > least:
-            left[k] = min(float((felt + (away**2).sum(axis=1) / (2.0 * tip_radius)).min()) / top, 1.0)
-    tried, left = tried[left > HELD_SHARE], left[left > HELD_SHARE]
+    near: Any = cKDTree(inspection.points).query_ball_point(tried, half_width, return_sorted=False)
+    counts = np.array([len(balls) for balls in near], dtype=np.int64)
+    balls = np.fromiter(itertools.chain.from_iterable(near), np.int64, int(counts.sum()))
+    tried, counts = tried[counts > 0], counts[counts > 0]
+    if not len(tried):
+        return tried
+    begin = np.cumsum(counts) - counts
+    felt, away = inspection.height[balls], inspection.points[balls] - np.repeat(tried, counts, axis=0)
+    top = np.maximum.reduceat(felt, begin)
+    held = np.minimum.reduceat(felt + (away**2).sum(axis=1) / (2.0 * tip_radius), begin)
+    high = top > 0.5 * half_width**2 / (2.0 * tip_radius)
+    left = np.minimum(held[high] / top[high], 1.0)
+    tried, left = tried[high][left > HELD_SHARE], left[left > HELD_SHARE]
     return _thinned(tried, left - HELD_SHARE, ONE_PLACE * half_width)
 
 

@@ -55,20 +55,18 @@ def summits(places: IntArray, sign: float, inspection: Inspection) -> list[IntAr
     ]
 
 
-def _next_to(points: FloatArray, sweep: IntArray) -> list[set[int]]:
+def _next_to(points: FloatArray, sweep: IntArray) -> list[list[int]]:
     """Of each place those before and behind it on its sweep, and the nearest of other sweeps."""
     from scipy.spatial import cKDTree
 
-    near: list[set[int]] = [set() for _ in points]
-    pairs = [(int(i), int(i) + 1) for i in np.flatnonzero(sweep[1:] == sweep[:-1])]
+    behind = np.flatnonzero(sweep[1:] == sweep[:-1])
+    one, other = [behind], [behind + 1]
     for number in np.unique(sweep):
         own, others = np.flatnonzero(sweep == number), np.flatnonzero(sweep != number)
         if len(others):
-            found = (
-                cKDTree(points[others]).query(points[own], min(NEIGHBOURS_ASIDE, len(others)))[1].reshape(len(own), -1)
-            )
-            pairs += [(int(i), int(others[j])) for i, row in zip(own, found, strict=True) for j in row]
-    for i, j in pairs:
-        near[i].add(j)
-        near[j].add(i)
-    return near
+            found = cKDTree(points[others]).query(points[own], min(NEIGHBOURS_ASIDE, len(others)))[1].ravel()
+            one.append(np.repeat(own, len(found) // len(own)))
+            other.append(others[found])
+    pairs = np.array([np.concatenate([*one, *other]), np.concatenate([*other, *one])])
+    place, near = np.divmod(np.unique(pairs[0] * len(points) + pairs[1]), len(points))
+    return [each.tolist() for each in np.split(near, np.searchsorted(place, np.arange(1, len(points))))]
