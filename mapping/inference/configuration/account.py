@@ -228,15 +228,18 @@ def _improved(
 
 def _bent_as_fitted(group: Sequence[Feature], start: Configuration, around: Surroundings) -> list[Feature]:
     """The features as the rules left them, but of a configuration that leaves no more than noise the lines that bend as
-    they are fitted: through coarse rows the rules lay a polygon, which is off its course between them."""
-    bent = [kind_of(feature).line and len(feature.axis) > 2 for feature in group]
-    if not start.fits or not any(bent):
+    they are fitted: through coarse rows the rules lay a polygon, which is off such a course between them."""
+    if not start.fits or not any(kind_of(feature).line and len(feature.axis) > 2 for feature in group):
         return list(group)
-    told = dict(zip(itertools.compress(range(len(group)), start.stands), _described(start, around), strict=True))
-    return [
-        replace(told[k], evidence=feature.evidence) if bent[k] and k in told else feature
-        for k, feature in enumerate(group)
-    ]
+    stand = itertools.compress(range(len(group)), start.stands)
+    told = {k: feature for k, feature in zip(stand, _described(start, around), strict=True) if _bends(feature, around)}
+    return [replace(told[k], evidence=feature.evidence) if k in told else feature for k, feature in enumerate(group)]
+
+
+def _bends(feature: Feature, around: Surroundings) -> bool:
+    """True of a line that leaves its chord by more than it is felt to either side: what noise bends does not."""
+    half = sizes_of(feature, around.trace.tip_radius).half_width if kind_of(feature).line else np.inf
+    return bool(distances(feature.axis, feature.axis[[0, -1]]).max() > half)
 
 
 def _pays_beside_misfit(found: Account) -> bool:

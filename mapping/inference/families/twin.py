@@ -13,7 +13,7 @@ from mapping.inference.families.trapezoid import NARROWEST_PART, WIDEST_PART
 from mapping.inference.likelihood import LogOfUniform, Prior
 
 # Ridges from one of both to the other that fill the gap: the ball sinks by a 64th of what it sinks into the gap
-FILLED = tuple(np.linspace(-1.0, 1.0, 9).tolist())
+FILLING_SIDES = tuple(np.linspace(-1.0, 1.0, 9).tolist())
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class TwinShape:
     @property
     def filled(self) -> TwinShape:
         """The same without the gap, which ridges in between fill: a bar from one to the other."""
-        return replace(self, sides=FILLED)
+        return replace(self, sides=FILLING_SIDES)
 
     @property
     def names(self) -> tuple[str, ...]:
