@@ -16,6 +16,9 @@ from mapping.detection import Crossing
 
 # Crossings further apart than this many sweep distances are not linked, whatever lies between.
 LONGEST_LINK = 6.0
+# A line crossed at a slant lies no farther aside of the sweep than so many times what the crossing's width says,
+# which goes by the root of its height, and by where the line bends: a quarter as high it is half as wide
+AS_SLANTED = 2.0
 # Linked crossings differ in height by less than this factor: sweeps beside an end see less of it.
 HEIGHT_RATIO = 0.2
 # A place so near to a supposed line, in half-widths, must have felt it.
@@ -35,7 +38,8 @@ def groups(crossings: Sequence[Crossing], inspection: Inspection, scale: float) 
     points = np.array([c.point for c in crossings])
     # the next sweep meets a line that is crossed at a slant as many times farther on as the crossing is wider
     slant = np.array([max(c.half_width / scale, 1.0) for c in crossings])
-    pairs = _pairs(points, LONGEST_LINK * max(min(inspection.pitch, 1e300), scale) * slant)
+    along = np.array([c.tangent for c in crossings])
+    pairs = _pairs(points, along, LONGEST_LINK * max(min(inspection.pitch, 1e300), scale), slant)
     for i, j in pairs:
         if root(i) != root(j) and linked(crossings[i], crossings[j], inspection, scale):
             parent[root(i)] = root(j)
@@ -45,13 +49,23 @@ def groups(crossings: Sequence[Crossing], inspection: Inspection, scale: float) 
     return sorted(members.values())
 
 
-def _pairs(points: FloatArray, reach: FloatArray) -> list[tuple[int, int]]:
-    """Pairs of points (N, 3) no further apart than both of them reach (N,), m, the nearest first."""
+def _pairs(points: FloatArray, along: FloatArray, reach: float, slant: FloatArray) -> list[tuple[int, int]]:
+    """Pairs of points (N, 3) no further apart than `reach`, m, or, on sweeps that went along (N, 3), as many times that
+    as both are slanted (N,), and as near to either sweep as a line at that slant; the nearest first."""
     from scipy.spatial import cKDTree
 
-    pairs = cKDTree(points).query_pairs(float(reach.max()), output_type="ndarray")
-    distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
-    near = distance <= reach[pairs].min(axis=1)
+    # each within its own reach: one that is slanted most would else pair all with all
+    near_each = cKDTree(points).query_ball_point(points, reach * slant)
+    first = np.repeat(np.arange(len(points)), [len(each) for each in near_each])
+    pairs = np.column_stack([first, np.concatenate(near_each).astype(np.int64)])
+    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
+    way = points[pairs[:, 1]] - points[pairs[:, 0]]
+    distance = np.linalg.norm(way, axis=1)
+    far = np.ones(len(pairs), dtype=bool)
+    for own in pairs.T:
+        aside = np.linalg.norm(np.cross(way, along[own]), axis=1)
+        far &= (distance <= reach * slant[own]) & (aside * slant[own] <= AS_SLANTED * distance)
+    near = (distance <= reach) | far
     pairs, distance = pairs[near], distance[near]
     return [(int(i), int(j)) for i, j in pairs[np.lexsort((pairs[:, 1], pairs[:, 0], distance))]]
 

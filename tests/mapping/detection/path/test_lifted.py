@@ -51,7 +51,9 @@ def laid(trace: Trace) -> LaidTrace:
     return LaidTrace.of(trace, fit_base(trace))
 
 
-@pytest.mark.parametrize(("lift", "step"), [(3e-3, 0.2e-3), (20e-3, 0.2e-3), (20e-3, 0.03e-3)])
+@pytest.mark.parametrize(
+    ("lift", "step"), [(3e-3, 0.2e-3), (20e-3, 0.03e-3), pytest.param(20e-3, 0.2e-3, marks=pytest.mark.slow)]
+)
 def test_paths_through_the_air_are_told_from_rows(lift: float, step: float) -> None:
     trace, felt = recorded([row(y, k % 2 == 0) for k, y in enumerate(ROWS)], lift, step)
     found = lifted(laid(trace))
@@ -73,7 +75,9 @@ def rolled(surface: FloatArray) -> FloatArray:
     return np.array([(padded[i : i + 2 * reach + 1] + cap).max() for i in range(len(surface))])
 
 
-@pytest.mark.parametrize("height", [3e-3, 8e-3, 15e-3, -6e-3])
+@pytest.mark.parametrize(
+    "height", [3e-3, pytest.param(8e-3, marks=pytest.mark.slow), pytest.param(15e-3, marks=pytest.mark.slow), -6e-3]
+)
 def test_a_block_or_a_pocket_is_felt(height: float) -> None:
     x = np.linspace(0.0, 60e-3, 601)
     surface = np.where(np.abs(x - 30e-3) < 12e-3, height, 0.0)
