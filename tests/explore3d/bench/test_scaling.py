@@ -48,6 +48,7 @@ def test_a_long_log_holds_what_was_asked_for(tmp_path: Path):
     assert trace.centers[:, 2].max() > 10e-3 + 0.5e-3
 
 
+@pytest.mark.slow
 def test_finished_sizes_are_not_run_again(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(bench_scaling, "TRIANGLE_COUNTS", (100, 200))
     first = list(bench_scaling.bench_scaling(tmp_path / "store.jsonl", ["triangles"]))

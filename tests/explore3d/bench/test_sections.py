@@ -39,6 +39,7 @@ def test_dilation_by_brute_force_finds_the_closed_form_of_a_wire() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_bar_gets_its_height_and_bounds_of_its_width(tmp_path: Path) -> None:
     store = tmp_path / "sections.jsonl"
     (record,) = bench_sections(["trapezoid"], ["white"], range(SEED, SEED + 1), store)

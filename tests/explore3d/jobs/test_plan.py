@@ -149,6 +149,7 @@ def run_text(folder: Path, text: str, name: str) -> SurfaceAccount:
     return account
 
 
+@pytest.mark.slow
 def test_pecks_far_apart_leave_surface_between_them(tmp_path: Path) -> None:
     """A probe touches where it pecks alone: a plan that counts the whole way between promises what no run keeps."""
     text = WIRE.with_name("grbl_peck.toml").read_text()

@@ -78,6 +78,7 @@ def table(path: Path, log: Log) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_several_files_are_one_job_or_one_each_and_that_is_said(tmp_path: Path) -> None:
     one, other = table(tmp_path / "a.csv", raster_over(0)), table(tmp_path / "b.csv", raster_over(1))
     far = table(tmp_path / "far.csv", raster_over(2, (0.2, 0.0, 0.0)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from mapping import FloatArray
 from mapping.assembly import AlongSweeps, along_sweeps
@@ -54,6 +55,7 @@ def test_a_slot_between_the_rows_has_its_width_and_depth() -> None:
     assert any("along the sweeps" in note for note in groove.notes)
 
 
+@pytest.mark.slow
 def test_a_wire_along_the_rows_has_its_height() -> None:
     along, laid = found(wire(0.4e-3))
     assert along is not None

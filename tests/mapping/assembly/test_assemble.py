@@ -179,6 +179,7 @@ def test_a_circuit_on_the_plateau_adds_nothing_to_a_step():
     assert step.kind == "step"
 
 
+@pytest.mark.slow
 def test_two_ridges_that_cross_are_two_ridges():
     found = features(
         ridges([[-0.03, -0.02, RADIUS], [0.03, 0.02, RADIUS]], [[-0.01, 0.03, RADIUS], [0.012, -0.03, RADIUS]])

@@ -94,6 +94,7 @@ def test_the_mean_section_of_rows_that_sample_elsewhere_bounds_a_ridge_with_shar
     assert sizes.most == pytest.approx(1e-3 + 2.0 * np.sqrt(2.0 * tip * 0.2e-3 - 0.2e-3**2), rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_line_that_widens_or_rises_says_so() -> None:
     def widening(x: FloatArray, y: FloatArray) -> FloatArray:
         return np.maximum(0.0, 1e-6 * (1.0 - (x / (12e-6 + 0.05 * y)) ** 2)) * (np.abs(y) < 90e-6)

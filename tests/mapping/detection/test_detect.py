@@ -349,6 +349,7 @@ def test_places_under_correlated_noise_lie_within_their_intervals() -> None:
     assert 0.82 <= np.mean(inside) <= 0.98
 
 
+@pytest.mark.slow
 def test_the_doubt_of_a_place_is_that_of_all_half_widths_however_finely_they_are_looked_at(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

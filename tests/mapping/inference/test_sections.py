@@ -54,6 +54,7 @@ def refined(top: float, growth: float = 0.0) -> Feature:
     return refine(ridge(), trace, np.random.default_rng(0), base=PLATE, noise=NOISE, confirm=False)
 
 
+@pytest.mark.slow
 def test_of_a_bar_the_height_is_known_and_the_foot_is_bounded() -> None:
     found = refined(2e-3)
     assert found.height.low < 0.4e-3 < found.height.high and found.height.high - found.height.low < 10e-6
@@ -64,6 +65,7 @@ def test_of_a_bar_the_height_is_known_and_the_foot_is_bounded() -> None:
     assert f"{found.width}" == f"between 2 and {1e3 * found.width.high:.2g} mm"
 
 
+@pytest.mark.slow
 def test_of_a_roof_nothing_is_said_but_how_wide_it_is_at_most() -> None:
     found = refined(0.0)
     assert found.width.bounded and f"{found.width}".startswith("at most 5.")

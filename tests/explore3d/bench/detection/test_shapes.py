@@ -28,6 +28,7 @@ def told(felt: FeltShape, axis: FloatArray, kind: str = "ridge", size: float = 1
     return replace(feature, **more)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_sets_for_building_and_for_reporting_have_no_seed_and_no_size_in_common() -> None:
     reported, built = felt_shape("S 30 mm", 1), felt_shape("S 30 mm", BUILT)
     assert reported.height == 2.0 * WIRE_RADIUS != built.height

@@ -9,6 +9,7 @@ from explore3d.bench.display import bench_touch, best_shares, touch, touch_lines
 from hw.simulated import NoiseSource
 
 
+@pytest.mark.slow
 def test_the_detector_feels_what_people_feel_and_guesses_where_nothing_is(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(touch, "HUMAN_HEIGHTS", {"dot 231 um": touch.HUMAN_HEIGHTS["dot 231 um"]})
     monkeypatch.setattr(touch, "HEIGHT_SHARES", (1e-3, 1.0))

@@ -159,6 +159,7 @@ def test_more_details_than_are_weighed_at_once_are_weighed_beside_each_other(mon
     assert all(ENDED_EARLY in each.notes for each in assemble(detect(trace, base), trace, base, faint=False))
 
 
+@pytest.mark.slow
 def test_what_others_leave_beside_a_detail_is_none_of_its_own() -> None:
     """Four domes of braille whose disturbances do not touch, and reach into the places that each is weighed on."""
     tip, height, foot = 1.5e-3, 0.48e-3, 0.8e-3
@@ -398,6 +399,7 @@ def test_what_only_bounds_a_hollow_is_no_ridge() -> None:
         assert [feature.kind for feature in assemble(detect(trace, base), trace, base, faint=False)] == ["groove"]
 
 
+@pytest.mark.slow
 def test_a_groove_whose_walls_run_out_is_asked_as_such_before_anything_is_put_beside_it() -> None:
     trace, base = _cosine_groove(10e-6, 2)
     up = np.tile([0.0, 0.0, 1.0], (len(trace), 1))

@@ -61,6 +61,7 @@ def test_the_heights_are_those_of_a_dilation_by_brute_force() -> None:
 
 
 @pytest.mark.parametrize("worn", [True, False])
+@pytest.mark.slow
 def test_evidence_tells_a_worn_ball_from_one_that_stands_too_low(worn: bool) -> None:
     trace, base = recorded(worn)
     found = refine(GUESS, trace, np.random.default_rng(1), base=base, noise=WHITE, confirm=False)

@@ -57,6 +57,7 @@ def test_what_is_not_known_of_neighbours_is_doubt_of_a_feature():
     np.testing.assert_allclose(with_theirs, of_all, rtol=0.1)
 
 
+@pytest.mark.slow
 def test_domes_are_all_as_high_as_they_are():
     found = refine_all(GUESSES, record(ROWS, domes, NOISE, 3), 0, base=plate(), noise=NOISE, confirm=None)
     for one in found:
