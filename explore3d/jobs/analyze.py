@@ -57,9 +57,9 @@ def analyze(
         report: False to write no report and no pictures.
         cutoffs: nesting indices of the L-filter and of the S-filter for roughness, m; None: by the standard.
         quick: only existence, places and sizes: no report, no chains, no estimated surface.
-        table: tip_sd, form, mask, tolerances (explore3d.log.load_logs); units, columns, frame, jump, reference, pixel
-            of a table (explore3d.log.table.read_table); average: samples of a run that becomes one, their mean; part:
-            which of several that a file holds.
+        table: tip_sd, form, mask, in_contact, tolerances (explore3d.log.load_logs); units, columns, frame, jump,
+            reference, pixel of a table (explore3d.log.table.read_table); average: samples of a run that becomes one,
+            their mean; part: which of several that a file holds.
 
     Raises:
         UserError: input that cannot be used, named by file and field.

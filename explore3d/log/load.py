@@ -21,6 +21,7 @@ def load_logs(
     tip_sd: str | float | None = None,
     form: str | None = None,
     mask: Sequence[str] | None = None,
+    in_contact: bool | None = None,
     tolerances: Path | str | None = None,
     **table: Any,
 ) -> Log:
@@ -34,6 +35,8 @@ def load_logs(
         tip_sd: standard deviation of that radius; None: what scene or table say.
         form: what the base is, where it is fitted (mapping.base.Form); None: what a table's sidecar says.
         mask: stretches in x that the base is not fitted to, "1.2mm..1.4mm"; None: what a table's sidecar says.
+        in_contact: True if the finger touched at every sample, and nothing is to be left out as lifted; None: so it is
+            of logs of ours, and of a table what its sidecar says.
         tolerances: file that says what the drawing allows (explore3d.scene.read_tolerances); None: what scenes and
             sidecars say.
         table: the other settings of read_table; `average` is one for every kind of file.
@@ -45,6 +48,8 @@ def load_logs(
     log = merge([read_recording(Path(path), {"tip_radius": tip_radius} | table) for path in paths])
     if tip_sd is not None:
         log = replace(log, tip_sd=_tip_sd(tip_sd), tip_sd_assumed=False)
+    if in_contact is not None:
+        log = replace(log, in_contact=in_contact)
     if allowed is not None:
         log = replace(log, tolerances=allowed)
     if form is None and mask is None:

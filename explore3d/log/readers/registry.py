@@ -102,5 +102,5 @@ def read_recording(path: Path, settings: Mapping[str, Any]) -> Log:
     read = reader_of(path).read(path, given)
     if not isinstance(read, Log):
         about = {"read_as": [f"{reader_of(path).name}, {len(read)} rows"]}
-        read = Log(trace=read, metadata=about, sha256=digest(path), sources=(str(path),))
+        read = Log(trace=read, metadata=about, sha256=digest(path), sources=(str(path),), in_contact=False)
     return read if length is None or "average" in read.metadata else averaged_log(read, length)

@@ -178,6 +178,19 @@ def test_a_log_of_1e5_samples_gives_the_same_features_in_every_form(tmp_path: Pa
     assert counted >= 40
 
 
+def test_a_table_is_vouched_for_by_who_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "robot.csv"
+    path.write_text("x,y,z\n" + "\n".join(f"{x},{y},{z}" for x, y, z in SMALL.points) + "\n")
+    told: dict[str, Any] = {"tip_radius": 1e-3, "units": "mm"}
+    assert not load_logs([path], **told).in_contact
+    assert load_logs([path], in_contact=True, **told).in_contact
+    path.with_suffix(".toml").write_text("in_contact = true\n")
+    assert load_logs([path], **told).in_contact
+    path.with_suffix(".toml").write_text('in_contact = "perhaps"\n')
+    with pytest.raises(UserError, match=r"robot\.toml: in_contact"):
+        load_logs([path], **told)
+
+
 def test_one_force_alone_is_what_presses(tmp_path: Path) -> None:
     rows = "\n".join(f"{x},{y},{z},1.5" for x, y, z in SMALL.points)
     path = tmp_path / "pressed.csv"
