@@ -76,14 +76,23 @@ def rolled(surface: FloatArray) -> FloatArray:
 
 
 @pytest.mark.parametrize(
-    "height", [3e-3, pytest.param(8e-3, marks=pytest.mark.slow), pytest.param(15e-3, marks=pytest.mark.slow), -6e-3]
+    ("height", "half_width", "noise"),
+    [
+        (3e-3, 12e-3, NOISE),
+        (3e-3, 2e-3, 70e-6),
+        (-6e-3, 12e-3, NOISE),
+        pytest.param(8e-3, 12e-3, NOISE, marks=pytest.mark.slow),
+        pytest.param(15e-3, 12e-3, NOISE, marks=pytest.mark.slow),
+    ],
 )
-def test_a_block_or_a_pocket_is_felt(height: float) -> None:
+def test_a_block_or_a_pocket_is_felt_also_where_noise_bends_the_path(
+    height: float, half_width: float, noise: float
+) -> None:
     x = np.linspace(0.0, 60e-3, 601)
-    surface = np.where(np.abs(x - 30e-3) < 12e-3, height, 0.0)
+    surface = np.where(np.abs(x - 30e-3) < half_width, height, 0.0)
     rows = [row(y, k % 2 == 0, rolled(surface)) for k, y in enumerate(ROWS)]
     places = np.concatenate(rows)
-    places = places + np.random.default_rng(3).normal(0.0, NOISE, places.shape)
+    places = places + np.random.default_rng(3).normal(0.0, noise, places.shape)
     trace = Trace(np.arange(len(places)) * 4e-3, places, np.repeat(np.arange(len(rows)), 601), TIP)
     assert lifted(laid(trace)) is None
 
