@@ -22,8 +22,8 @@ from mapping.geometry.mesh import distances
 from mapping.inference.kinds import sizes_of
 from mapping.instrument import Noise
 
-# Places of a section that its distance from what is told is taken at
-PLACES_OF_SECTION = 33
+# Most places of a section that its distance from what is told is taken at
+PLACES_OF_SECTION = 200
 
 
 def felt_alone(detections: Detections, trace: LaidTrace, features: Sequence[Feature]) -> list[Feature]:
@@ -45,10 +45,13 @@ def felt_alone(detections: Detections, trace: LaidTrace, features: Sequence[Feat
 
 def _disturbs(feature: Feature, section: FreeSection, tip_radius: float) -> bool:
     """True if what was felt of a feature reaches into a section."""
-    crossing = section.crossing
-    places = crossing.point + np.linspace(-0.5, 0.5, PLACES_OF_SECTION)[:, None] * section.extent * crossing.tangent
     free, half = feature.details.free_section, 0.5 * feature.width.high
-    return bool(distances(places, feature.axis).min() < (half if free else sizes_of(feature, tip_radius).half_width))
+    reach = half if free else sizes_of(feature, tip_radius).half_width
+    # so near to each other that no line runs through between two of them
+    count = 2 + int(min(2.0 * section.extent / max(reach, np.finfo(float).tiny), PLACES_OF_SECTION))
+    crossing = section.crossing
+    places = crossing.point + np.linspace(-0.5, 0.5, count)[:, None] * section.extent * crossing.tangent
+    return bool(distances(places, feature.axis).min() < reach)
 
 
 def _spot(section: FreeSection, detections: Detections, trace: LaidTrace) -> Feature:

@@ -16,7 +16,8 @@ from mapping.instrument import neighbour_scatter, robust_scale
 # do not fit them: 57 and 46
 WIDER_THAN_CREST = 1.5
 # Several sweeps over one detail are judged together, by their median: one may be a sixth less wide. Of a weld bead
-# as wide as the ball, whose height varies by an eighth along it, 31 sweeps show 1.42 to 1.58 times a crest
+# as wide as the ball, whose height varies by an eighth along it, 31 sweeps show 1.42 to 1.58 times a crest.
+# It is one line with 1.0 to 1.4, and all other wide lines of the tests are the same
 OF_WIDE_LINE = 1.25
 # Bins from where a section leaves the base to where it returns, at least, if its noise asks for wider bins than the
 # finest. 6 to 8 are alike, of 12 one scratch of 20 is lost
