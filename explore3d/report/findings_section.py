@@ -13,6 +13,7 @@ from explore3d.report.findings import (
     dropped_warning,
     form_warnings,
     kinds_found,
+    lifted_sentence,
     limit_sentence,
     misfit_warnings,
     number_text,
@@ -24,6 +25,7 @@ from explore3d.report.findings import (
     tip_warning,
     undecided_text,
     warning_lines,
+    yielding_sentence,
 )
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.report.pictures import Pictures, is_profile
@@ -100,7 +102,8 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
     """Counts, the table of features, and the views."""
     features = analysis.model.features
     content: list[str] = [_counts(analysis)]
-    content.extend(element("p", warning, class_="warning") for warning in deviation_warning(analysis))
+    of_the_trace = *lifted_sentence(analysis), *yielding_sentence(analysis), *deviation_warning(analysis)
+    content.extend(element("p", warning, class_="warning") for warning in of_the_trace)
     content.extend(element("p", warning, class_="warning") for warning in warning_lines(analysis))
     if features:
         head = ("feature", "height", "width", "length", "place", "evidence", "kind of detail", "posterior")

@@ -17,7 +17,8 @@ from explore3d.report.pictures import Pictures
 from explore3d.report.report import report_page, write_report
 from mapping.base.base import Base
 from mapping.detection.detect import Detections
-from mapping.detection.path import PathLedger
+from mapping.detection.path import Lifted, PathLedger
+from mapping.estimate.deviation import Yielding
 from mapping.estimate.envelope import estimate_surface
 from mapping.feature import Feature, Interval, LeftOut, Support
 from mapping.geometry.curvature import principal_curvatures
@@ -140,6 +141,14 @@ def test_an_empty_result_says_what_would_have_been_seen() -> None:
     text = words(report_page(analysis(()), Pictures({}), []))
     assert "Nothing was found that the base does not explain." in text
     assert "A sharp crest 40 µm high or higher is seen with 95 % probability" in text
+
+
+def test_what_was_changed_of_the_trace_stands_on_the_page() -> None:
+    lifted = Lifted(np.ones(3, dtype=bool), 12, 0.5, 0.02, TIP)
+    yielding = Yielding(1e-5, 1e-6, 5.0, 1.0, 20.0)
+    text = words(report_page(replace(analysis(), lifted=lifted, yielding=yielding), Pictures({}), []))
+    assert "The finger was lifted 12 times, up to 20 mm off the base: 500 mm of path" in text
+    assert f"By the recorded forces {yielding.sentence()}." in text
 
 
 def test_texts_from_outside_cannot_become_markup() -> None:
