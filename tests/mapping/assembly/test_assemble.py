@@ -85,6 +85,7 @@ def test_a_bump_is_a_bump_and_two_are_two():
     assert [f.kind for f in two] == ["bump", "bump"]
 
 
+@pytest.mark.slow
 def test_a_ring_is_one_closed_ridge():
     angle = np.linspace(0, 2 * np.pi, 60)
     ring = np.column_stack([0.03 * np.cos(angle), 0.03 * np.sin(angle), np.full(60, RADIUS)])

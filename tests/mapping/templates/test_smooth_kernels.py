@@ -65,6 +65,7 @@ def test_a_ball_rests_on_a_smooth_pit_as_on_each_of_its_points(taper: float, dep
     assert (out[0] < -0.02 * depth).sum() > 4
 
 
+@pytest.mark.slow
 def test_a_groove_is_felt_as_its_section_as_the_base_bends_and_ends_round() -> None:
     """Along a line over which the base bends more and more, and beyond its end."""
     depth, half, taper = 0.4e-3, 0.8e-3, -0.4

@@ -67,6 +67,7 @@ def test_normals_of_facets_of_a_ball_are_the_balls() -> None:
     np.testing.assert_allclose(normals, ball.vertices[ball.faces], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_flats_that_were_felt_as_flats_stay() -> None:
     surface = prism(40)
     centers = rings(RADIUS + 4.0 * TIP).centers

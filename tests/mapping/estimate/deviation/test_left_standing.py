@@ -44,6 +44,7 @@ def standing(trace: Trace) -> list[LeftStanding]:
     return left_standing(laid)
 
 
+@pytest.mark.slow
 def test_a_wide_hollow_across_a_raster_is_one_with_its_depth_and_width() -> None:
     (found,) = standing(raster(hollow, np.random.default_rng(1)))
     assert found.sweeps == 11 and abs(found.place[0]) < 10e-6

@@ -183,6 +183,7 @@ def test_sweeps_over_a_sphere_become_a_mesh_on_the_sphere(bend):
     assert (estimate.surface.face_normals[:, 2] > 0.5).all()
 
 
+@pytest.mark.slow
 def test_slopes_across_the_sweeps_converge_with_the_pitch():
     errors = []
     for pitch in (0.4, 0.2):
@@ -380,6 +381,7 @@ def test_smoothing_by_the_noise_removes_the_bias_of_the_envelope():
     assert estimate.fraction(TOUCHED) > 0.95
 
 
+@pytest.mark.slow
 def test_a_million_samples_are_estimated_in_a_few_seconds():
     x = np.linspace(0, 1, 1_000_000)
     trace = Trace.from_profile(x, 0.01 * np.sin(30 * x), 0.05)

@@ -325,6 +325,7 @@ def bumpy(count: int, seed: int = 0) -> tuple[Surface, np.ndarray]:
     return Surface(surface.vertices, faces), np.maximum(*BumpOfRevolution(15.0).curvatures(np.hypot(x, y)))
 
 
+@pytest.mark.slow
 def test_an_apex_between_too_few_vertices_has_no_valid_curvature():
     for seed in range(4):
         surface, _ = bumpy(14, seed)
