@@ -81,6 +81,18 @@ class _Section:
         inside = self.low < corners[0] and corners[-1] < self.high
         return bool((np.diff(corners) >= 0.0).all() and inside and (np.abs(sines) < STEEPEST_SINE).all())
 
+    def steps(self, noise: float) -> bool:
+        """True of two lines that are one another's parallels, as far as heights of a noise (m) tell, with a climb
+        between them like what a ball makes of a wall: no wider than its radius, and nowhere rounder than it follows."""
+        order = np.argsort(self.places)
+        places, sines = self.places[order], np.concatenate([[0.0], np.cumsum(self.turns[order])])
+        round_ones = np.concatenate([[0], np.cumsum(self.rounding[order] > 0.0)])
+        first, last = np.triu_indices(len(places), 1)
+        turned = np.abs(sines[last + 1] - sines[first]) * (self.high - self.low)
+        sharp = round_ones[last + 1] == round_ones[first]
+        like_a_wall = sharp & (places[last] - places[first] < self.tip_radius)
+        return bool((like_a_wall & (turned < FEATURE_RESIDUAL_SDS * noise)).any())
+
     def outline(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(K,) places along the section, heights and sines: corners, and places of each arc; a kink is many in one."""
         begin, end = self.spans
@@ -113,7 +125,8 @@ def extrusion(cloud: Cloud) -> Fitted | None:
 
     The line's direction is begun where straight pieces across it explain the path best, and so many bends where these
     are parted best into runs of one slope; then all is free. What stands off is parted from what is explained until
-    that settles, so that a detail along the line is no bend. None where no section with a bend can be laid.
+    that settles, so that a detail along the line is no bend. None where no section with a bend can be laid, and of a
+    body on two levels: a step, which is a detail upon a plane (`terraced_plane`).
     """
     thinned = cloud.points[:: max(1, len(cloud.points) // SEARCHED_CELLS)]
     direction, knots, sines, height = _pieces(thinned, cloud)
@@ -132,7 +145,7 @@ def extrusion(cloud: Cloud) -> Fitted | None:
         return None
     theta = _sharpened(_settled(best, cloud.points, cloud), cloud)
     section, frame, along = _laid(theta, cloud.points, cloud.tip_radius)
-    if not section.possible:
+    if not section.possible or section.steps(cloud.floor):
         return None
     return Fitted(
         "extrusion",

@@ -7,6 +7,7 @@ import pytest
 
 from mapping import FloatArray, Trace
 from mapping.base import Base, fit_base
+from mapping.geometry.templates import step_height
 
 TIP, NOISE, HALF = 0.01, 2e-5, 0.03
 
@@ -107,3 +108,11 @@ def test_a_rail_between_ends_on_one_plane_stays_a_detail_on_it() -> None:
     """As rails are bodies' sections too, every wire and every step that all rows cross would be one."""
     bends = [(-0.016, 0.6, 0.004), (-0.006, -0.6, 0.014), (0.006, -0.6, 0.014), (0.016, 0.6, 0.004)]
     assert fit_base(felt(path_over(bends), 0.3)).kind == "plane"
+
+
+@pytest.mark.parametrize(("height", "turn"), [(2e-3, 0.3), pytest.param(5e-3, 0.0, marks=pytest.mark.slow)])
+def test_a_step_is_a_detail_upon_a_plane_and_no_bent_body(height: float, turn: float) -> None:
+    p = np.linspace(-1.6 * HALF, 1.6 * HALF, 40001)
+    base = fit_base(felt((p, step_height(p, height, TIP)), turn))
+    assert base.kind == "plane"
+    assert np.ptp(base.levels) == pytest.approx(height, rel=1e-2)
