@@ -9,7 +9,7 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Trace
 from mapping.assembly.details import along_rested, details_of, made_of
-from mapping.assembly.edges import edge_features, step_features
+from mapping.assembly.edges import between_levels, edge_features, step_features
 from mapping.assembly.faint_features import faint_spacing, why_none_sought, with_faint_lines
 from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
 from mapping.assembly.free import free_sections, free_spot, outweighed, round_lines
@@ -83,15 +83,17 @@ def assemble(
         sections = [section for section in sections if not any(lies_on(section.crossing, each) for each in flat)]
         wide, slanted = free_lines(sections, detections, laid)
         # several sections may hold what stands off all of them
-        fine = {id(c): c for c in [*rest, *upon, *(crossing for section in slanted for crossing in section.inside)]}
-        crossings = tuple(c for c in fine.values() if not any(lies_on(c, feature) for feature in wide))
+        stepped = [c for c in crossings if c.is_step and between_levels(c, inspections.at(spacing))] if spacing else []
+        held = [crossing for section in slanted for crossing in section.inside]
+        fine = {id(c): c for c in [*rest, *upon, *held]}
+        crossings = _off_lines([*fine.values(), *(c for c in stepped if id(c) not in fine)], wide, stepped)
         if wide and spacing is not None:
             looked = inspections.at(spacing)
             beside = _linked(replace(detections, crossings=crossings), laid, looked)
             lost = outweighed(wide, beside, _linked(detections, laid, looked), looked, laid.tip_radius)
             if any(lost):
                 wide = [feature for feature, out in zip(wide, lost, strict=True) if not out]
-                crossings = tuple(c for c in detections.crossings if not any(lies_on(c, feature) for feature in wide))
+                crossings = _off_lines(detections.crossings, wide, stepped)
         detections = replace(detections, crossings=crossings)
     features = flat if spacing is None else [*flat, *_linked(detections, laid, inspections.at(spacing))]
     if features and spacing is not None and proposals:
@@ -103,6 +105,14 @@ def assemble(
     if faint:
         features = with_faint_lines(features, detections, laid, base, false_alarms_per_metre, inspections)
     return _strongest_first([*wide, *round_it, *features])
+
+
+def _off_lines(
+    crossings: Sequence[Crossing], lines: Sequence[Feature], stepped: Sequence[Crossing]
+) -> tuple[Crossing, ...]:
+    """Crossings that are no part of wide lines; steps between two levels go on under whatever is on them."""
+    own = set(map(id, stepped))
+    return tuple(c for c in crossings if id(c) in own or not any(lies_on(c, line) for line in lines))
 
 
 def inspected_for(

@@ -134,9 +134,20 @@ def step_features(
     steps: Sequence[Crossing], features: Sequence[Feature], around: Around, scale: float
 ) -> list[Feature]:
     """Steps that no other feature explains; in an area at least two sweeps must agree on one."""
-    free = [c for c in steps if not _explained(c, features, around.tip_radius)]
+    free = [c for c in steps if between_levels(c, around.inspection) or not _explained(c, features, around.tip_radius)]
     lines = [[free[i] for i in members] for members in groups(free, around.inspection, scale)] if free else []
     return [_step(line, around) for line in lines if len({c.sweep for c in line}) > 1]
+
+
+def between_levels(step: Crossing, inspection: Inspection) -> bool:
+    """True where the base has one level before a step and another behind it, whatever stands upon its edge."""
+    if not len(inspection.lowered):
+        return False
+    own = inspection.of_sweep(step.sweep)
+    along = (inspection.points[own] - step.point) @ step.tangent
+    level = (inspection.height - inspection.lowered)[own]
+    before, behind = level[along < -step.half_width], level[along > step.half_width]
+    return bool(len(before) and len(behind) and abs(behind[0] - before[-1]) > 0.5 * abs(step.height))
 
 
 def _explained(step: Crossing, features: Sequence[Feature], tip_radius: float) -> bool:

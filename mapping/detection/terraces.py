@@ -88,14 +88,22 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
     passed = int((2.0 * np.sqrt(tip_radius * on) + 2.0 * MEAN * tip_radius) / profile.spacing)
     runs = _runs(own.argmin(axis=1), own.min(axis=1) < on, reach, max(passed, TERRACE_BINS))
     runs = _up_to_edges(runs, reach, smooth, levels)
+    upon = [
+        _beyond(smooth, begin, last, np.sort(levels[[here, there]]), on)
+        for (begin, _, here), (_, last, there) in itertools.pairwise(runs)
+    ]
     # a long way from one level to the next is no edge, and the base's levels are none of this sweep's
-    if not runs or any(onward - end > reach for (_, end, _), (onward, _, _) in itertools.pairwise(runs)):
+    bare = [
+        onward - end - np.count_nonzero(stands[end:onward])
+        for ((_, end, _), (onward, _, _)), stands in zip(itertools.pairwise(runs), upon, strict=True)
+    ]
+    if not runs or max(bare, default=0) > reach:
         return Terraced(profile)
     # an arc is higher than the noise only so far from its end, and the means come a little nearer
     rounded = int((MEAN * tip_radius + np.sqrt(2 * tip_radius * on)) / profile.spacing) + 1
     height, edges = profile.height - levels[runs[0][2]], []
     level = np.full(len(height), levels[runs[-1][2]])
-    for (begin, end, here), (onward, last, there) in itertools.pairwise(runs):
+    for ((begin, end, here), (onward, last, there)), stands in zip(itertools.pairwise(runs), upon, strict=True):
         height[onward:] += levels[here] - levels[there]
         # the way from one to the other is no path over a base: the terrace behind it stands in, with its noise; a part
         # of every terrace is left, however short it is, coarse the bins and strong the noise
@@ -103,9 +111,16 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
         way = np.arange(end - min(rounded, (end - begin) // 2), behind)
         level[0 if begin == runs[0][0] else begin : end] = levels[here]
         level[way] = np.nan
-        height[way] = np.pad(height[behind:last], (len(way), 0), mode="symmetric")[: len(way)]
-        # details of the two terraces are none of the edge's
+        terrace = height[behind:last]
+        calm = terrace[~stands[behind:last]]
+        height[way] = np.pad(calm if len(calm) else terrace, (len(way), 0), mode="symmetric")[: len(way)]
+        # details of the two terraces are none of the edge's, nor is what stands upon it: that is one of the nearer
+        # level
         plain = profile.height.copy()
+        plain[stands] = np.clip(plain[stands], *np.sort(levels[[here, there]]))
+        upon_edge = way[stands[way]]
+        level[upon_edge] = plain[upon_edge]
+        height[upon_edge] = profile.height[upon_edge] - plain[upon_edge]
         farther = slice(begin, max(begin, end - reach)), slice(min(onward + reach, last), last)
         for ground, detail in zip((here, there), farther, strict=True):
             stands = np.abs(plain[detail] - levels[ground]) >= FEATURE_RESIDUAL_SDS * noise
@@ -115,6 +130,19 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
         up = levels[there] > levels[here]
         edges.append(Edge(piece, (end - start, stop - start) if up else (0, onward - start)))
     return Terraced(replace(profile, height=height), tuple(edges), level)
+
+
+def _beyond(height: FloatArray, begin: int, end: int, bounds: FloatArray, noise: float) -> BoolArray:
+    """Which of the heights (n,) from one bin to another are of what stands above both levels, or lies below both.
+
+    No ball that rolls over an edge is higher than its upper level, or lower than its lower one. What is so by more than
+    the noise (m) goes on to either side as far as the heights are beyond the levels at all.
+    """
+    off = height[begin:end] - np.clip(height[begin:end], *bounds)
+    sides = np.concatenate([[0], np.cumsum(np.diff(np.sign(off)) != 0)])
+    found = np.zeros(len(height), dtype=bool)
+    found[begin:end] = np.isin(sides, sides[np.abs(off) > noise])
+    return found
 
 
 def _runs(level: IntArray, on: BoolArray, shortest: float, passed: int) -> list[tuple[int, int, int]]:

@@ -88,7 +88,7 @@ def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[FreeSe
         if left or levelled:
             between = float(np.median(np.diff(sweep.arclength)))
             for over in sweep.heights(max(between, FINEST * trace.tip_radius)):
-                own, above = of_all_scales(over, trace.tip_radius, share, least), _on_levels(over, trace)
+                own, above = of_all_scales(over, trace.tip_radius, share, least), _on_levels(over, trace, least)
                 above = [each for each in above if not any(overlap(each, other) for other in own)]
                 for number, section in enumerate([*own, *above]):
                     inside = [c for c in left if _overlaps(section, c, sweep.trace.t)]
@@ -133,10 +133,10 @@ def free_spot(section: FreeSection, algorithm: int) -> Feature:
     )
 
 
-def _on_levels(piece: SweepHeights, trace: LaidTrace) -> list[Section]:
+def _on_levels(piece: SweepHeights, trace: LaidTrace, least: float) -> list[Section]:
     """The sections of a piece over the levels that it runs on; none over a base of one level."""
     over = terraced(piece, trace.base, trace.tip_radius).profile
-    return [] if over is piece else of_all_scales(over, trace.tip_radius)
+    return [] if over is piece else of_all_scales(over, trace.tip_radius, least=least)
 
 
 def _measured(

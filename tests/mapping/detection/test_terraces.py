@@ -71,6 +71,18 @@ def test_a_ridge_and_grooves_on_either_level_are_found_beside_the_edge() -> None
     assert len(detections.crossings) == 3 * LINES
 
 
+def test_a_bead_upon_an_edge_is_a_ridge_over_the_upper_level() -> None:
+    def height(x: FloatArray) -> FloatArray:
+        return np.maximum(step_height(x, 0.2e-3, TIP), 0.7e-3 - x**2 / (2.0 * (2e-3 + TIP)))
+
+    trace = raster(height)
+    base = fit_base(trace)
+    features = {feature.kind: feature for feature in assemble(detect(trace, base), trace, base)}
+    assert sorted(features) == ["ridge", "step"]
+    assert features["ridge"].height.median == pytest.approx(0.5e-3, rel=0.05)
+    assert features["step"].height.median == pytest.approx(0.2e-3, rel=0.05)
+
+
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_a_plateau_too_narrow_for_a_terrace_has_two_edges_however_it_is_noisy(seed: int) -> None:
     detections = found(
