@@ -62,7 +62,7 @@ class Proposal:
     def _log_parts(self, theta: FloatArray) -> FloatArray:
         """(C, S) log of each component's share of the density."""
         count = self.means.shape[1]
-        z = np.einsum("cij,csj->csi", self._inverses, theta[None] - self.means[:, None])
+        z = (theta[None] - self.means[:, None]) @ self._inverses.swapaxes(1, 2)
         square = np.einsum("csi,csi->cs", z, z)
         return np.asarray(self._levels[:, None] - 0.5 * (DEGREES + count) * np.log1p(square / DEGREES))
 
