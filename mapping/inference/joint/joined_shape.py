@@ -247,7 +247,7 @@ def _rest_on(felt: FloatArray, crests: Sequence[_Distinct], sunk: float) -> None
     without: dict[tuple[int, ...], FloatArray] = {(): highest}
     for row, own in enumerate(changed):
         if (key := tuple(own)) not in without:
-            where = np.isin(top, own)
+            where = (top == np.array(own)[:, None]).any(axis=0)
             without[key] = np.where(where, second, highest)
             if len(own) > 1:
                 without[key][where] = np.delete(commonest, own, axis=0)[:, where].max(axis=0, initial=-np.inf)
@@ -294,5 +294,9 @@ class OneOfMany(LogPosterior):
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights of all of them together, m."""
-        joined = JoinedShape([self.shape], len(self.likelihood.window), self.fine, self.others, self.theirs)
-        return joined.templates(theta)
+        return self._joined.templates(theta)
+
+    @cached_property
+    def _joined(self) -> JoinedShape:
+        """All of them; what the others leave is worked out once."""
+        return JoinedShape([self.shape], len(self.likelihood.window), self.fine, self.others, self.theirs)
