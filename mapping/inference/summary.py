@@ -19,14 +19,24 @@ FEW_DRAWS = 400
 AXIS_POINTS = 64
 
 
-def describe(problem: PosteriorProblem, posterior: Posterior, base: Base) -> Feature:
-    """The detected feature with axis, intervals and standard deviation from the draws of its posterior."""
+def describe(
+    problem: PosteriorProblem, posterior: Posterior, base: Base, likeliest: FloatArray | None = None
+) -> Feature:
+    """The detected feature with axis, intervals and standard deviation from the draws of its posterior.
+
+    Args:
+        problem, posterior: whose parameters were drawn.
+        base: the global model.
+        likeliest: (P,) of the draws; None: the density tells.
+    """
     full, problem = posterior, with_nominal_tip(problem)
     shape: Any = problem.target.shape
     # What is described is the feature: the draws of a free tip's radius, in the last column, are left out.
     posterior = replace(full, samples=full.samples[:, : len(shape.names)])
-    described = _describe_line if kind_of(problem.feature).line else _describe_point
-    feature = described(problem, shape, posterior, base)
+    if kind_of(problem.feature).line:
+        feature = _describe_line(problem, shape, posterior, base, likeliest)
+    else:
+        feature = _describe_point(problem, shape, posterior, base)
     notes = tuple(note for note in (*feature.notes, *_warnings(posterior)) if note)
     return replace(feature, posterior=full, notes=tuple(dict.fromkeys(notes)))
 
@@ -68,7 +78,9 @@ def _describe_point(problem: PosteriorProblem, shape: PointShape, posterior: Pos
     )
 
 
-def _describe_line(problem: PosteriorProblem, shape: LineShape, posterior: Posterior, base: Base) -> Feature:
+def _describe_line(
+    problem: PosteriorProblem, shape: LineShape, posterior: Posterior, base: Base, likeliest: FloatArray | None
+) -> Feature:
     draws, chart, modes = posterior.samples, shape.chart, shape.modes
     has_ends = not chart.closed and kind_of(problem.feature).has_ends
     low, high = float(chart.s[0]), float(chart.s[-1])
@@ -85,8 +97,9 @@ def _describe_line(problem: PosteriorProblem, shape: LineShape, posterior: Poste
     if chart.closed:
         axis[-1], normals[-1] = axis[0], normals[0]
     section = kind_of(problem.feature).section(problem.feature, shape, draws)
-    distinct = np.unique(draws, axis=0)  # a weighted draw is there as often as it weighs
-    best = distinct[int(np.argmax(problem.target.log_density(distinct)))] if has_ends else None
+    best = None
+    if has_ends:
+        best = _likeliest(problem, draws) if likeliest is None else likeliest
     seen = None if best is None else explored(problem, best)
     length, notes = _length(problem, shape, draws, best, seen)
     # Along the axis: how well it is known across itself, and its two ends along itself (first, last).
@@ -110,6 +123,12 @@ def _describe_line(problem: PosteriorProblem, shape: LineShape, posterior: Poste
         ),
         details=replace(problem.feature.details, **section.details, **known),
     )
+
+
+def _likeliest(problem: PosteriorProblem, draws: FloatArray) -> FloatArray:
+    """(P,) the draw of the highest density."""
+    distinct = np.unique(draws, axis=0)  # a weighted draw is there as often as it weighs
+    return np.asarray(distinct[int(np.argmax(problem.target.log_density(distinct)))])
 
 
 def _ends(problem: PosteriorProblem) -> list[int]:
@@ -154,17 +173,15 @@ def _lengths(shape: LineShape, draws: FloatArray, ends: FloatArray) -> FloatArra
 
     Each is as long on its chords as the chart there, and as a smooth curve.
     """
-    chart, modes, arcs = shape.chart, shape.modes, shape.chart.arcs
+    chart, modes = shape.chart, shape.modes
     share = np.linspace(0.0, 1.0, AXIS_POINTS if len(chart.s) > 8 or modes.degree > 1 else 2)
-    lengths = np.empty(len(draws))
-    for k, (theta, (first, last)) in enumerate(zip(draws, ends, strict=True)):
-        s = first + share * (last - first)
-        points, laterals, _, _ = chart.at(s)
-        course = points + modes.lateral(theta[None, : modes.count], s)[0][:, None] * laterals
-        chords, own = (np.linalg.norm(np.diff(of, axis=0), axis=1) for of in (points, course))
-        smooth = np.diff(np.interp(s, chart.s, arcs))
-        lengths[k] = own @ np.divide(smooth, chords, out=np.ones_like(chords), where=chords > 0.0)
-    return lengths
+    s = ends[:, :1] + share * (ends[:, 1:] - ends[:, :1])
+    points, laterals, _, _ = chart.at(s)
+    aside = np.einsum("sm,msk->sk", draws[:, : modes.count], modes.basis(s))
+    chords, own = (np.linalg.norm(np.diff(of, axis=1), axis=2) for of in (points, points + aside[..., None] * laterals))
+    smooth = np.diff(np.interp(s, chart.s, chart.arcs), axis=1)
+    stretched = np.divide(smooth, chords, out=np.ones_like(chords), where=chords > 0.0)
+    return np.asarray(np.einsum("sk,sk->s", own, stretched))
 
 
 def _of_smooth(length: Interval, chart: Chart) -> Interval:

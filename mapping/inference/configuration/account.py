@@ -423,7 +423,7 @@ def _described(best: Configuration, around: Surroundings, algorithms: tuple[int,
         some = np.clip(draws[:, own], target.low, target.high)
         some[0] = theta[own]
         posterior = Posterior(part.shape.names, part.shape.units, some, nan, nan, "not needed", "preliminary")
-        found = describe(problem, posterior, around.base)
+        found = describe(problem, posterior, around.base, likeliest=some[0])
         support = Support(best.strength(k), best.runs(k), algorithms)
         features.append(replace(found, posterior=None, evidence=support))
     return features
