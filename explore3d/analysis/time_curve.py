@@ -15,6 +15,7 @@ from mapping.detection import Detections
 from mapping.geometry.mesh import nearest_on, resample
 from mapping.model import ObjectModel
 
+# The last one is the finished model's
 MOMENTS = 8
 
 
@@ -53,7 +54,7 @@ def time_curve(
     inspections = inspections or inspected_for(detections, laid, model.base, faint=faint)
     begun = {sweep.number: float(sweep.trace.t[0]) for sweep in reversed(laid.laid_sweeps)}
     times = np.array([crossing.t for crossing in detections.crossings])
-    moments = np.unique(np.quantile(times, np.linspace(0.0, 1.0, MOMENTS), method="nearest"))
+    moments = np.unique(np.quantile(times, np.linspace(0.0, 1.0, MOMENTS)[:-1], method="nearest"))
     curve = []
     for done, moment in enumerate(moments):
         # a sweep is finished before anyone can know what it found

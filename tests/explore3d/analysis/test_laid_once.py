@@ -94,7 +94,7 @@ def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height
     analysis = build_model(Log(trace), None, plate(), Stages())
     (ridge,) = analysis.model.features
     assert ridge.height.median == pytest.approx(DIAMETER, rel=0.03)
-    assert len(analysis.time_curve) > 1  # the curve looks at the features eight times over
+    assert len(analysis.time_curve) > 1  # the curve looks at the features seven times over
     assert sum(laid) <= 1.05 * len(trace)
     assert max(profiles.values()) == 1 and len(inspected) == 1
     # one width of bins for detection, one for lines of crossings, one for lines that no sweep shows, and one for the
