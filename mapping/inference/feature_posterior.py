@@ -270,7 +270,20 @@ def settle(feature: Feature, around: Surroundings) -> Feature:
 
 def odds_against_nothing(solution: Solution) -> float:
     """Log Bayes factor of a solved feature against the bare base (with the neighbours that it was posed with)."""
-    return solution.importance.log_evidence - log_evidence_of_nothing(solution.problem.target)
+    return _log_odds(solution.problem, solution.importance)
+
+
+def _log_odds(problem: PosteriorProblem, importance: Importance) -> float:
+    return importance.log_evidence - log_evidence_of_nothing(problem.target)
+
+
+def _hardly_spoken_for(problem: PosteriorProblem, importance: Importance) -> bool:
+    """True of what the evidence makes a false alarm: it is not told, and nobody asks how well its draws are known.
+
+    Under noise that was raised to the misfit existence is not judged.
+    """
+    evidence = replace(problem.feature.evidence, log_odds=_log_odds(problem, importance))
+    return problem.misfit == 0.0 and not evidence.likely
 
 
 def pose_problem(feature: Feature, around: Surroundings) -> PosteriorProblem:
@@ -287,12 +300,16 @@ def pose_problem(feature: Feature, around: Surroundings) -> PosteriorProblem:
 def solve_problem(
     problem: PosteriorProblem, rng: np.random.Generator, *, confirm: bool | None = True, adapt: bool = True
 ) -> Solution:
-    """Optimum, misfit (unless `adapt` is False: the noise is known), importance sampling, and emcee where needed."""
+    """Optimum, misfit (unless `adapt` is False: the noise is known), importance sampling, and emcee where needed.
+
+    Unless it is asked for, no chain confirms what the evidence makes a false alarm.
+    """
     optima = find_optima(problem.target, problem.beginnings)
     if adapt:
         problem, optima = account_for_misfit(problem, optima)
     fast = importance_sample(problem.target, [laplace(problem.target, optimum) for optimum in optima], rng)
-    if confirm is None or (not confirm and fast.k_hat < TRUSTED_K_HAT):
+    enough = fast.k_hat < TRUSTED_K_HAT or _hardly_spoken_for(problem, fast)
+    if confirm is None or (not confirm and enough):
         return Solution(problem, _from_importance(problem, fast, rng), fast, None)
     walkers = walkers_for(len(problem.window), fast.draws.shape[1])
     starts = _starts(problem, fast, rng, walkers)

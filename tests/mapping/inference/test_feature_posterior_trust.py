@@ -25,10 +25,12 @@ from recorded_features import (
 
 from explore3d.bench.posterior.calibration import Case, campaign, noise_of, run_case
 from explore3d.bench.posterior.calibration_verdicts import verdicts
+from mapping.errors import SamplerError
 from mapping.feature import Support
 from mapping.geometry.templates.shapes import cap_height, groove_height, rim_height, step_height
+from mapping.inference import feature_posterior
 from mapping.inference.families.problem import Surroundings
-from mapping.inference.feature_posterior import pose_problem, refine, sample_posterior
+from mapping.inference.feature_posterior import pose_problem, refine, sample_posterior, solve_problem
 from mapping.inference.sampler.ensemble import sample_ensemble
 from mapping.inference.sampler.importance import importance_sample
 from mapping.inference.sampler.laplace import find_optima, laplace
@@ -56,6 +58,29 @@ def test_location_reaches_the_cramer_rao_bound(diameter):
         variances.append(posterior.draws("along").var())
     bound = noise.white / diameter * np.sqrt(3 * spacing * np.sqrt(2 * TIP * diameter) / 8)
     assert np.sqrt(np.mean(variances)) == pytest.approx(bound, rel=0.10)
+
+
+def test_no_chain_confirms_what_the_evidence_makes_a_false_alarm(monkeypatch):
+    """Not even where its draws cannot be trusted; what is there is confirmed."""
+    asked = []
+
+    def chain(*_, **__):
+        asked.append(True)
+        raise SamplerError("not in this test")
+
+    monkeypatch.setattr(feature_posterior, "TRUSTED_K_HAT", 0.0)
+    monkeypatch.setattr(feature_posterior, "sample_ensemble", chain)
+    guess = feature("bump", (-3e-3, 0.1e-3, 0), D, D, crossings=1)
+
+    def solved(truth):
+        around = Surroundings(record(CROSSINGS[1:2], truth, WHITE), plate(), WHITE)
+        return solve_problem(pose_problem(guess, around), np.random.default_rng(0), confirm=False)
+
+    nothing = solved(lambda feet: np.zeros(len(feet)))
+    assert not asked and nothing.chain is None and not nothing.posterior.trusted
+    with pytest.raises(SamplerError):
+        solved(wire(ENDS))
+    assert asked
 
 
 @pytest.mark.slow
