@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import Feature, FloatArray, Interval, Support
+from mapping import Details, Feature, FloatArray, Interval, Support
 from mapping.assembly.lines import ONE_POINT, Around, mean_point, merged
-from mapping.assembly.linking import Inspection, groups, main_line
+from mapping.assembly.linking import Inspection, groups, main_line, uphill
 from mapping.detection import Crossing
 from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.inference.kinds import kind_made_of
@@ -177,4 +177,13 @@ def _step(line: list[Crossing], around: Around) -> Feature:
         evidence=Support(float(np.sqrt(sum(c.snr**2 for c in line))), len(line), (around.detections.algorithm,)),
         curvature_feature=any(c.curvature_feature for c in line),
         position_sd=float(np.median([c.position_sd for c in line])),
+        details=Details(high_side=_high_side(line, axis, normals)),
     )
+
+
+def _high_side(line: Sequence[Crossing], axis: FloatArray, normals: FloatArray) -> float:
+    """+1 if the side of normal x tangent along an axis (K, 3) is the one that the sweeps rose to, else -1."""
+    leg = np.array([np.linalg.norm(axis - c.point, axis=1).argmin() for c in line])
+    way = axis[np.minimum(leg + 1, len(axis) - 1)] - axis[np.maximum(leg - 1, 0)]
+    rise = (np.cross(normals[leg], way) * np.array([uphill(c) for c in line])).sum()
+    return 1.0 if rise > 0.0 else -1.0

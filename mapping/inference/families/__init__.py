@@ -24,13 +24,13 @@ if TYPE_CHECKING:
         MEETING_REACH as MEETING_REACH,
         MODEL_FLOOR as MODEL_FLOOR,
         PRECISE as PRECISE,
-        WINDOW_REACH as WINDOW_REACH,
         PosteriorProblem as PosteriorProblem,
         Sizes as Sizes,
         Surroundings as Surroundings,
         touches as touches,
         window_for as window_for,
         window_of_all as window_of_all,
+        window_reach as window_reach,
     )
     from mapping.inference.families.ridge import RidgeShape as RidgeShape, rounding_of as rounding_of
     from mapping.inference.families.smooth_hollow import (
@@ -74,12 +74,12 @@ _PUBLIC = {
         "MODEL_FLOOR",
         "PRECISE",
         "PosteriorProblem",
-        "WINDOW_REACH",
         "Sizes",
         "Surroundings",
         "touches",
         "window_for",
         "window_of_all",
+        "window_reach",
     ),
     "ridge": ("RidgeShape", "rounding_of"),
     "smooth_hollow": (

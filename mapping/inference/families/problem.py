@@ -132,7 +132,8 @@ def window_for(crest: FloatArray, normals: FloatArray, sizes: Sizes, around: Sur
 def window_of_all(crest: FloatArray, normals: FloatArray, sizes: Sequence[Sizes], around: Surroundings) -> Window:
     """The bins near the crests of some features (K, 3), lifted to the ball's centre, m; their normals: wide enough for
     the widest of them, and fine enough for the narrowest."""
-    samples = gather(around.trace, around.base, crest, normals, max(_reach(each, around) for each in sizes))
+    reach = max(window_reach(each, around.trace.tip_radius) for each in sizes)
+    samples = gather(around.trace, around.base, crest, normals, reach)
     narrowest = min(each.half_width for each in sizes)
     width = narrowest / WINDOW_BINS_PER_HALF_WIDTH
     precise = around.noise.sd <= PRECISE * max(each.height for each in sizes)
@@ -144,11 +145,11 @@ def window_of_all(crest: FloatArray, normals: FloatArray, sizes: Sequence[Sizes]
     return window
 
 
-def _reach(sizes: Sizes, around: Surroundings) -> float:
+def window_reach(sizes: Sizes, tip_radius: float) -> float:
     """How far from its crest a feature's window reaches, m."""
     # beside a wide detail the base is told within as much as beside a thin one of its height: what stands farther off
     # is another's
-    thin = float((2.0 * around.trace.tip_radius * sizes.height) ** 0.5)
+    thin = float((2.0 * tip_radius * sizes.height) ** 0.5)
     return min(WINDOW_REACH * sizes.half_width, sizes.half_width + WINDOW_REACH * thin) + 2.0 * sizes.position_sd
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from mapping import Feature, Interval, Trace
 from mapping.base import Base
 from mapping.inference import noise_of_trace, refine, settle
-from mapping.inference.families import WINDOW_REACH, Surroundings
+from mapping.inference.families import Surroundings, window_reach
 from mapping.inference.joint.blocks import blocks_of, gaps
 from mapping.inference.joint.junctions import Meeting, brought_together, meetings
 from mapping.inference.joint.neighbours import MOST_TOGETHER, NeighboursDoubt, laid_together
@@ -118,9 +118,10 @@ def _groups(numbers: Sequence[int], features: Sequence[Feature], tip: float) -> 
     A step goes on to wherever its level does: one whose wall lies in the window of another one touches it.
     """
     wide = [replace(feature, width=Interval(*(feature.width.high,) * 3)) for feature in features]
+    sizes = [sizes_of(feature, tip) for feature in wide]
     reaches = [
-        sizes_of(feature, tip).half_width * (0.5 * (WINDOW_REACH + 1.0) if kind_of(feature).sided else 1.0)
-        for feature in wide
+        0.5 * (window_reach(size, tip) + size.half_width) if kind_of(feature).sided else size.half_width
+        for feature, size in zip(wide, sizes, strict=True)
     ]
     gap = gaps(wide, reaches)
     blocks = blocks_of(gap, range(len(features)), MOST_TOGETHER)
