@@ -278,12 +278,15 @@ def _ended(group: Sequence[Span], around: Around) -> tuple[bool, bool]:
 
 
 def _ends(outermost: Span, aside: FloatArray, height: float, around: Around) -> bool:
-    """True if sweeps beside the outermost span were felt below half of the height: up to where the ball that touches
-    its wall comes down, and one sweep more."""
+    """True if a sweep beside the outermost span was felt below half of the height all along its middle half: up to
+    where the ball that touches its wall comes down, and one sweep more. A line at a slant goes on beside a part of it.
+    """
     inspection = around.inspection
     reach = NEXT_SWEEP * inspection.pitch + float(np.sqrt(2.0 * around.tip_radius * abs(height)))
     near = inspection.near(outermost.middle + np.array([[-0.25], [0.25]]) * outermost.chord, reach)
     offset = inspection.points[near] - outermost.middle
     out, along = offset @ aside, offset @ outermost.chord / outermost.length**2
     beside = (out > 0.5 * inspection.pitch) & (out < reach) & (np.abs(along) < 0.25)
-    return int((beside & (inspection.height[near] / height < 0.5)).sum()) > 1
+    low = inspection.height[near] / height < 0.5
+    own = [low[beside & (inspection.sweep[near] == number)] for number in np.unique(inspection.sweep[near[beside]])]
+    return any(len(each) > 1 and bool(each.all()) for each in own)

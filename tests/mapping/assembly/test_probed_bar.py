@@ -54,3 +54,11 @@ def test_the_edges_of_a_bar_are_known_to_rise_to_each_other():
     assert first.kind == second.kind == "step"
     assert (uphill(first, second.axis) > 0.5 * WIDTH).all()
     assert (uphill(second, first.axis) > 0.5 * WIDTH).all()
+
+
+def test_a_bar_at_a_slant_to_the_rows_does_not_end_where_the_next_row_meets_half_of_it():
+    steps = told(probed(3e-3, 1.2, 1e-6, 227, to_and_fro=True))
+    assert [step.kind for step in steps] == ["step", "step"]
+    for step in steps:
+        assert step.details.misfit is None
+        assert abs(step.height.median - HEIGHT) < 2e-6
