@@ -17,6 +17,9 @@ NEAR_FOOT = 0.5 * FLANK
 # heights 84, 0.01: 85); where it is flat over more, up to so many times as many (1: heights 85, 10: 86). Of a V's tip
 # a parabola takes 0.2 of what these places fall short of it
 EXTREME_SD, EXTREME_WINDOW = 0.005, 4
+# Places that a parabola is drawn through: where fewer are nearly as high as the extreme, one over those beside is told
+# by the flanks, of a bar of 0.1 mm felt at two places 12 % too high
+FEWEST_OF_TOP = 3
 # What lies above this share of the height is called the top (or floor); of a parabola that is 0.22 of the width, less
 # than the third from which a top counts as flat by the standard. 0.9 and 0.98 are alike
 NEARLY_FLAT = 0.95
@@ -34,7 +37,7 @@ class SectionSizes:
 
     Args:
         height, height_sd: of its extreme over the base (positive), and its standard deviation.
-        below: by how much it may go on beyond what was felt.
+        below: by how much it may go on beyond what was felt, below it or between two samples.
         width, width_sd: on the body, and its standard deviation by noise.
         foot_doubt: by how much the width may be another where the foot is round, or a side steep between two samples.
         top: width of what is nearly as high as the extreme.
@@ -74,10 +77,14 @@ class SectionSizes:
         )
 
     def height_interval(self, sign: float, sd: float = 0.0) -> Interval:
-        """The signed height: what was felt, down to what may be below, by its own standard deviation or a larger."""
+        """The signed height: what was felt, as far as it may go on, by its own standard deviation or a larger.
+
+        Flanks of a hollow meet somewhere below what was felt; a crest may be as flat as it was felt.
+        """
         sd = max(sd, self.height_sd)
         low, deep = (Interval.normal(sign * height, sd) for height in (self.height, self.height + self.below))
-        return Interval(0.5 * (low.median + deep.median), min(low.low, deep.low), max(low.high, deep.high))
+        usual = 0.5 * (low.median + deep.median) if sign < 0.0 else low.median
+        return Interval(usual, min(low.low, deep.low), max(low.high, deep.high))
 
     def width_interval(self, sd: float = 0.0) -> Interval:
         """The width by noise (its own, or more), and by its foot; or its bounds."""
@@ -91,7 +98,7 @@ class SectionSizes:
 
 def sizes_of_section(section: Section, tip: float, noise: Noise) -> SectionSizes | None:
     """What a section measures, by the noise of its bins; None if its flanks tell no size."""
-    height = _extreme(section, noise.sd)
+    height, hidden = _extreme(section, tip, noise.sd)
     width, width_sd, foot_doubt, middle = _width(section, tip, noise)
     least, most, least_sd = _bounds(section, tip, noise, width)
     steep = float(np.abs(np.diff(section.monotone)).max() / section.monotone.max())
@@ -100,28 +107,47 @@ def sizes_of_section(section: Section, tip: float, noise: Noise) -> SectionSizes
     left, right = flanks(section, NEARLY_FLAT)
     top = right.place - left.place
     hollow = section.sign < 0.0 and top < FLOOR * width
-    below = _unfelt_depth(section, tip, height, noise.sd) if hollow else 0.0
+    below = _unfelt_depth(section, tip, height, noise.sd) if hollow else hidden
     return SectionSizes(height, noise.sd, below, width, width_sd, foot_doubt, top, middle, steep, least, most, least_sd)
 
 
-def _extreme(section: Section, sd: float) -> float:
-    """The height (positive): the crest of a parabola about the extreme, over the places that noise (sd, m) asks for."""
+def _extreme(section: Section, tip: float, sd: float) -> tuple[float, float]:
+    """The height (positive): the crest of a parabola about the extreme, over the places that noise (sd, m) asks for;
+    and by how much more it may be between two samples, m.
+
+    Of a top that hardly any sample lies on the highest one is known, and how far a ball may rise beside it.
+    """
     z = section.sign * section.piece.height[section.begin : section.end + 1]
     high = float(section.monotone.max())
     # the middle of what is nearly as high, not its highest place, which is high by its noise
     top = np.flatnonzero(section.monotone > min(NEARLY_FLAT, 1.0 - 2.0 * sd / high) * high)
     needed = max(1, int((sd / (EXTREME_SD * high)) ** 2))
-    half = max(1, min(len(top) // 2, EXTREME_WINDOW * needed))
+    half = max(1, min((len(top) - 1) // 2, EXTREME_WINDOW * needed))
     middle = int(top[0] + top[-1]) // 2
     first = max(middle - half, 0)
     around = z[first : middle + half + 1]
+    if len(around) < FEWEST_OF_TOP or (section.sign > 0.0 and len(top) < FEWEST_OF_TOP):
+        return float(z[top].mean()), _rise_between(section, tip)
     u = np.arange(len(around)) - (middle - first)
-    if len(around) < 3:
-        return float(around.max())
     bent = np.polyfit(u, around, 2)
     crest = -0.5 * bent[1] / bent[0] if bent[0] < 0.0 else 0.0
     crest = float(np.clip(crest, u[0], u[-1]))
-    return float(np.polyval(bent, crest))
+    return float(np.polyval(bent, crest)), 0.0
+
+
+def _rise_between(section: Section, tip: float) -> float:
+    """By how much the trace of a crest may rise above its highest sample beside that, m: it is bent by the ball's
+    radius at most."""
+    if section.sign < 0.0:
+        return 0.0
+    spacing, top = section.piece.spacing, section.top - section.begin
+    beside = section.monotone[[top - 1, top + 1]].max() - section.monotone[top]
+    # the circle of the ball's radius through the highest sample and the higher one beside it
+    chord = float(np.hypot(spacing, beside))
+    if chord >= 2.0 * tip:
+        return tip
+    turn = np.arcsin(0.5 * chord / tip) + np.arctan2(beside, spacing)
+    return float(tip * (1.0 - np.cos(turn))) if turn > 0.0 else 0.0
 
 
 def _width(section: Section, tip: float, noise: Noise) -> tuple[float, float, float, float]:
