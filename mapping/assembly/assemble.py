@@ -83,17 +83,17 @@ def assemble(
         sections = [section for section in sections if not any(lies_on(section.crossing, each) for each in flat)]
         wide, slanted = free_lines(sections, detections, laid)
         # several sections may hold what stands off all of them
-        stepped = [c for c in crossings if c.is_step and between_levels(c, inspections.at(spacing))] if spacing else []
+        looked = None if spacing is None else inspections.at(spacing)
+        stepped = [] if looked is None else [c for c in crossings if c.is_step and between_levels(c, looked)]
         held = [crossing for section in slanted for crossing in section.inside]
-        fine = {id(c): c for c in [*rest, *upon, *held]}
-        crossings = _off_lines([*fine.values(), *(c for c in stepped if id(c) not in fine)], wide, stepped)
-        if wide and spacing is not None:
-            looked = inspections.at(spacing)
+        fine = {id(c): c for c in [*rest, *upon, *held, *stepped]}
+        crossings = _off_lines(tuple(fine.values()), wide, stepped, looked)
+        if wide and looked is not None:
             beside = _linked(replace(detections, crossings=crossings), laid, looked)
             lost = outweighed(wide, beside, _linked(detections, laid, looked), looked, laid.tip_radius)
             if any(lost):
                 wide = [feature for feature, out in zip(wide, lost, strict=True) if not out]
-                crossings = _off_lines(detections.crossings, wide, stepped)
+                crossings = _off_lines(detections.crossings, wide, stepped, looked)
         detections = replace(detections, crossings=crossings)
     features = flat if spacing is None else [*flat, *_linked(detections, laid, inspections.at(spacing))]
     if features and spacing is not None and proposals:
@@ -108,11 +108,11 @@ def assemble(
 
 
 def _off_lines(
-    crossings: Sequence[Crossing], lines: Sequence[Feature], stepped: Sequence[Crossing]
+    crossings: Sequence[Crossing], lines: Sequence[Feature], stepped: Sequence[Crossing], inspection: Inspection | None
 ) -> tuple[Crossing, ...]:
     """Crossings that are no part of wide lines; steps between two levels go on under whatever is on them."""
     own = set(map(id, stepped))
-    return tuple(c for c in crossings if id(c) in own or not any(lies_on(c, line) for line in lines))
+    return tuple(c for c in crossings if id(c) in own or not any(lies_on(c, line, inspection) for line in lines))
 
 
 def inspected_for(

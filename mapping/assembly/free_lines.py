@@ -63,11 +63,33 @@ def free_lines(
     return found, slanted
 
 
-def lies_on(crossing: Crossing, feature: Feature) -> bool:
-    """True of a crossing of the feature's sign within its width, or where its end may be: a part of it."""
+def lies_on(crossing: Crossing, feature: Feature, inspection: Inspection | None = None) -> bool:
+    """True of a crossing of the feature's sign within its width, or where its end may be: a part of it.
+
+    With an inspection the line goes on beyond an end that no sweep saw, as far as no place on its way was found lower.
+    """
     alike = crossing.is_step or crossing.height * feature.height.median > 0.0
     reach = 0.5 * feature.width.high + crossing.half_width + feature.length.high - feature.length.median
-    return bool(alike and distances(crossing.point[None], feature.axis)[0] < reach)
+    if not alike:
+        return False
+    if distances(crossing.point[None], feature.axis)[0] < reach:
+        return True
+    if inspection is None or not feature.length.censored or len(feature.axis) < 2:
+        return False
+    beyond = _gone_on(feature, crossing.point)
+    near = distances(crossing.point[None], beyond)[0] < reach
+    return bool(near and not inspection.denies(beyond, feature.height.median, CORE * feature.width.median))
+
+
+def _gone_on(feature: Feature, point: FloatArray) -> FloatArray:
+    """(M, 3) places from the nearer end of a line straight on to where it passes a point (3,)."""
+    first = np.linalg.norm(point - feature.axis[0]) < np.linalg.norm(point - feature.axis[-1])
+    axis = feature.axis[::-1] if first else feature.axis
+    back = axis[max(len(axis) - LAST_LEGS - 1, 0)]
+    way = (axis[-1] - back) / max(float(np.linalg.norm(axis[-1] - back)), np.finfo(float).tiny)
+    far = max(float((point - axis[-1]) @ way), 0.0)
+    count = int(np.ceil(far / (CORE * feature.width.median))) + 1
+    return np.asarray(axis[-1] + np.linspace(0.0, far, count)[:, None] * way)
 
 
 def _of_group(

@@ -65,6 +65,12 @@ def test_a_bar_at_a_slant_to_the_rows_does_not_end_where_the_next_row_meets_half
         assert abs(step.height.median - HEIGHT) < 2e-6
 
 
+def test_a_row_that_begins_on_a_bar_makes_no_bump_beside_it():
+    (bar,) = told(probed(1e-3, 1.2, 0.5e-6, 226, to_and_fro=False))
+    assert bar.kind == "ridge"
+    assert abs(bar.height.median - HEIGHT) < 1e-6
+
+
 @pytest.mark.parametrize(("tip", "angle"), [(1e-3, 0.0), (3e-3, 0.785)])
 def test_a_top_that_hardly_any_point_lies_on_is_no_higher_than_they_say(tip: float, angle: float):
     """A parabola over a flank and two points on the top was 12 % too high, without a doubt."""
