@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import Interval, length_text
-from mapping.assembly.free.section import FLANK, WALL, Section, flanks
+from mapping.assembly.free.section import FLANK, WALL, Flank, Section, flanks
 from mapping.instrument import Noise
 
 # The flank once more, half as high: where both tell another width the foot is round, and the width as doubtful as
@@ -153,24 +153,50 @@ def _rise_between(section: Section, tip: float) -> float:
 def _width(section: Section, tip: float, noise: Noise) -> tuple[float, float, float, float]:
     """(width on the body, its standard deviation by noise, by how much it may be another, middle), m.
 
-    The flanks are drawn on to the base, without the ball's part. Where both shares of the height tell another width by
-    more than their noise does, the foot is round. Where a side is nearly a wall, the chord between two samples is no
-    tangent of the circle that the ball rolls on, and its foot is as doubtful as the place of a wall is.
+    The flanks are drawn on to the base, without the ball's part; of what stands up a bent one goes on bent. Where both
+    shares of the height tell another width by more than their noise does, the foot is round. Where a side is nearly a
+    wall, the chord between two samples is no tangent of the circle that the ball rolls on, and its foot is as doubtful
+    as the place of a wall is.
     """
-    widths, sds, high = [], [], float(section.monotone.max())
+    widths, sds, bent, high = [], [], 0.0, float(section.monotone.max())
     for share in (NEAR_FOOT, FLANK):
-        left, right = flanks(section, share, noise)
-        begin, end = (
-            flank.foot
-            + side * section.sign * flank.hidden(tip, flank.wall if section.sign < 0.0 else high - flank.wall)
-            for side, flank in ((1.0, left), (-1.0, right))
-        )
+        sides, above = flanks(section, share, noise), flanks(section, 2.0 * share, noise)
+        hidden = [flank.hidden(tip, flank.wall if section.sign < 0.0 else high - flank.wall) for flank in sides]
+        begin, end = (sides[k].foot + side * section.sign * hidden[k] for k, side in enumerate((1.0, -1.0)))
+        inside = [0.0, 0.0]
+        if section.sign > 0.0:
+            inside = [_inside(*pair, share * high, tip) for pair in zip(sides, above, strict=True)]
+        begin, end, bent = begin + inside[0], end - inside[1], sum(inside)
         widths.append(end - begin)
-        sds.append(float(np.hypot(left.foot_sd, right.foot_sd)))
+        sds.append(float(np.linalg.norm([flank.foot_sd for flank in sides])))
     foot_doubt = float(np.sqrt(max((widths[1] - widths[0]) ** 2 - sds[0] ** 2, 0.0)))
     steepest = float(np.abs(np.diff(section.monotone)).max()) / (WALL * high)
-    foot_doubt = float(np.hypot(foot_doubt, min(steepest, 1.0) ** 2 * section.piece.spacing / np.sqrt(6.0)))
-    return widths[1], sds[1], foot_doubt, 0.5 * float(begin + end)
+    between = min(steepest, 1.0) ** 2 * section.piece.spacing / np.sqrt(6.0)
+    return widths[1], sds[1], float(np.linalg.norm([foot_doubt, between, bent])), 0.5 * float(begin + end)
+
+
+def _inside(low: Flank, above: Flank, felt: float, tip: float) -> float:
+    """How far inside the foot of its tangent that of a flank lies which grows steeper below as it does above, m.
+
+    The ball that rests on the base touches a flank r (1 - cos a) above it, and leaves no trace of what is below. The
+    square of a parabola's slope is linear in its height: such a one goes on from the lower of two places to the base.
+    Straight, or as bent again, it may be as well: that is the doubt of its foot. 0 of a flank that is straight within
+    the noise of its feet, and of one that runs out.
+
+    Args:
+        low, above: the flank where it is felt at a height over the base, and at twice that.
+        felt: that height, m.
+        tip: radius, m.
+    """
+    if not (np.isnan(low.wall) and np.isnan(above.wall)):
+        return 0.0
+    square = np.tan([low.angle, above.angle]) ** 2
+    touched = felt * np.array([1.0, 2.0]) + tip * (1.0 - np.cos([low.angle, above.angle]))
+    if square[0] <= square[1] or touched[0] >= touched[1]:
+        return 0.0
+    slope, at_foot = np.sqrt(square[0] + np.array([0.0, touched[0] * (square[0] - square[1]) / np.ptp(touched)]))
+    inside = touched[0] / slope - 2.0 * touched[0] / (slope + at_foot)
+    return float(np.sqrt(max(inside**2 - low.foot_sd**2 - above.foot_sd**2, 0.0)))
 
 
 def _bounds(section: Section, tip: float, noise: Noise, width: float) -> tuple[float, float, float]:

@@ -186,6 +186,24 @@ def test_of_flanks_that_it_went_down_on_the_width_is_a_number() -> None:
     assert not width.bounded and width.low < 3.3e-3 < width.high and width.high - width.low < 0.2e-3
 
 
+def bead(u: FloatArray) -> FloatArray:
+    """A parabola as wide as the ball, at whose foot this touches nothing."""
+    return np.clip(0.6e-3 * (1.0 - (u / 1.1e-3) ** 2), 0.0, None)
+
+
+def cap(u: FloatArray) -> FloatArray:
+    """As high and wide, round."""
+    radius = (1.1e-3**2 + 0.6e-3**2) / 1.2e-3
+    return np.clip(np.sqrt(np.clip(radius**2 - u**2, 0.0, None)) - radius + 0.6e-3, 0.0, None)
+
+
+@pytest.mark.parametrize("form", [bead, cap])
+def test_a_round_foot_that_the_ball_did_not_touch_is_no_tangents_foot(form: Form) -> None:
+    width = of_one_section(form, 1e-6)
+    assert width.low < 2.2e-3 < width.high
+    assert width.median == pytest.approx(2.2e-3, rel=0.07)  # by the tangents 2.41 and 2.55 mm
+
+
 def of_one_section(form: Form, noise: float) -> Interval:
     """The width under a ball of 1 mm, in bins of 0.05 mm."""
     x = 2e-6 * np.arange(-2500, 2501)
