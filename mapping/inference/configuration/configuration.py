@@ -120,9 +120,10 @@ class Configuration:
     def gaps_are_felt(self) -> bool:
         """True if every twin is two: the ball sinks into its gap by more than noise makes of a flat top.
 
-        Two wires in one place leave the trace of a narrow bar, by its edges, and are no likelier: it is one detail.
+        Two edges of a narrow bar are two blades as well, whose radius and gap are free to leave its trace: it is one
+        detail. Wires that lie on the base are as wide as they are high, and two for all that the ball may bridge.
         """
-        twins = [part for part in self.parts if isinstance(part.shape, TwinShape)]
+        twins = [part for part in self.parts if isinstance(part.shape, TwinShape) and not part.shape.lying]
         return all(_gap_strength(part, self.place) > SINKS_SDS for part in twins)
 
     def strength(self, k: int) -> float:
@@ -294,12 +295,13 @@ def as_smooth(parts: Sequence[Part], k: int, place: Neighbourhood) -> Part:
     return Part(part.feature, smooth, begun[int(np.argmax(target.log_density(np.array(rows))))])
 
 
-def as_twin(part: Part, place: Neighbourhood, gap: float) -> Part:
-    """A ridge as two wires that leave a gap, m."""
+def as_twin(part: Part, place: Neighbourhood, gap: float, *, lying: bool = False) -> Part:
+    """A ridge as two that leave a gap, m, or as two wires that lie on the base."""
     ridge: Any = part.shape
-    twin = twin_beside(ridge, sizes_of(part.feature, ridge.tip_radius))
+    twin = twin_beside(ridge, sizes_of(part.feature, ridge.tip_radius), lying=lying)
     start = part.start.copy()
     start[-1] = np.log(0.5 * max(start[-2], 1e-3 * place.half_width))
+    start = start[:-1] if lying else start
     return Part(part.feature, twin, np.concatenate([[np.log(gap)], start]))
 
 
@@ -382,6 +384,8 @@ def _plain(part: Part, covariance: FloatArray) -> float:
     (Savage's ratio; Dickey, Annals of Mathematical Statistics 42, 1971).
     """
     shape: Any = part.shape
+    if isinstance(shape, TwinShape) and shape.lying:
+        return -float(np.log(2.0))
     ridge = shape.midway if isinstance(shape, TwinShape) else shape
     if not isinstance(ridge, RidgeShape):
         return 0.0

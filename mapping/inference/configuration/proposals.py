@@ -91,7 +91,7 @@ def sections(now: Configuration) -> Iterator[Parts]:
         half = sizes_of(ridge.feature, now.place.around.trace.tip_radius).half_width
         others = [as_bar(ridge, now.place, share * half) for share in TOPS]
         others += [as_bell(ridge, share * half) for share in SKIRTS]
-        others += [as_twin(ridge, now.place, share * half) for share in GAPS]
+        others += [as_twin(ridge, now.place, share * half, lying=wires) for share in GAPS for wires in (False, True)]
         if not isinstance(part.shape, RidgeShape):
             others.append(ridge)
         for other in others:
@@ -364,7 +364,7 @@ def _alike(part: Part, axis: FloatArray, place: Neighbourhood, most: int = HIGHE
     shape: Any = part.shape
     line = _line(part.feature, axis, place, most, least)
     if isinstance(shape, TwinShape):
-        return as_twin(line, place, float(np.exp(part.start[0])))
+        return as_twin(line, place, float(np.exp(part.start[0])), lying=shape.lying)
     if isinstance(shape, TrapezoidShape):
         return as_bar(line, place, float(shape.parts(part.start[None])[1][0]))
     if isinstance(shape, BellRidgeShape):

@@ -74,6 +74,11 @@ def test_more_crossings_are_no_more_evidence_for_a_second_wire(monkeypatch: pyte
     one = wire_with(wavy(-6e-6, 6, np.ones(6)))
     # between them the ball does not sink: what nearly touches is no second wire at all
     assert fitted([as_twin(one.parts[0], one.place, 0.2e-3)], one.place) is None
+    # but wires that lie on the base are as wide as they are high, and two whatever the ball bridges
+    lying, free = (as_twin(one.parts[0], one.place, 0.2e-3, lying=each) for each in (True, False))
+    assert lying.shape.names == free.shape.names[:-1]
+    assert (lying.shape.templates(lying.start[None]) == free.shape.templates(free.start[None])).all()
+    assert fitted([lying], one.place) is not None
     monkeypatch.setattr("mapping.inference.configuration.configuration.SINKS_SDS", 0.0)
     for runs in (6 * 2**k for k in doublings):
         found = wire_with(wavy(-6e-6, runs, np.ones(runs)))
