@@ -22,7 +22,7 @@ from mapping.assembly.runs import along, split_runs, told_crests
 from mapping.base import Base, LaidTrace
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import distances
-from mapping.inference.configuration import PROPOSALS, Places, Proposal, accounted
+from mapping.inference.configuration import PROPOSALS, Places, Proposal, accounted, is_two
 from mapping.inference.families import Surroundings
 from mapping.inference.kinds import kind_made_of
 
@@ -91,6 +91,11 @@ def assemble(
         if wide and looked is not None:
             beside = _linked(replace(detections, crossings=crossings), laid, looked)
             lost = outweighed(wide, beside, _linked(detections, laid, looked), looked, laid.tip_radius)
+            around = Surroundings(laid, base, detections.noise.rounded(laid.resolution))
+            lost = [
+                out or (bool(proposals) and is_two(line, _places(looked), around, false_alarms_per_metre))
+                for line, out in zip(wide, lost, strict=True)
+            ]
             if any(lost):
                 wide = [feature for feature, out in zip(wide, lost, strict=True) if not out]
                 crossings = _off_lines(detections.crossings, wide, stepped, looked)

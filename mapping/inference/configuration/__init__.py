@@ -13,11 +13,13 @@ if TYPE_CHECKING:
         numbers_in as numbers_in,
         share_as_told as share_as_told,
     )
+    from mapping.inference.configuration.wide_lines import is_two as is_two
 
 _PUBLIC = {
     "account": ("accounted",),
     "neighbourhood": ("Places",),
     "proposals": ("PROPOSALS", "Proposal"),
     "told": ("in_words", "numbers_in", "share_as_told"),
+    "wide_lines": ("is_two",),
 }
 doorway(__name__, _PUBLIC)

@@ -207,3 +207,15 @@ def test_a_bead_as_wide_as_the_ball_that_rises_and_falls_is_one_line() -> None:
     assert ridge.kind == "ridge"
     assert np.ptp(ridge.axis[:, 1]) > rows[-2]
     assert ridge.evidence.crossings == len(rows)
+
+
+def test_burrs_between_which_the_ball_sinks_by_less_than_a_sweep_tells_are_two_ridges() -> None:
+    """30 um high and 0.26 mm apart: between them the ball of 1 mm sinks by 8 um, three times the noise of a sample."""
+
+    def burrs(x: FloatArray, _: FloatArray) -> FloatArray:
+        arcs = [np.sqrt(np.maximum(1e-6 - (x - at) ** 2, 0.0)) - 0.97e-3 for at in (-0.13e-3, 0.13e-3)]
+        return np.maximum(np.maximum(*arcs), 0.0)
+
+    one, other = assembled(burrs, 1.5e-3 * np.arange(12))
+    assert one.kind == other.kind == "ridge"
+    assert abs(abs(one.axis[0, 0] - other.axis[0, 0]) - 0.26e-3) < 0.03e-3
