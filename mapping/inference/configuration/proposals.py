@@ -299,6 +299,32 @@ def other_kinds(now: Configuration) -> Iterator[Parts]:
                 yield [*rest, _line(like, short, now.place)]
 
 
+def ringed(now: Configuration, points: FloatArray) -> Iterator[Parts]:
+    """A closed ridge round a point that stands out, through the crests (M, 3) about it: of a ring hardly wider than
+    what a ball feels rows one way tell crests to both sides of its middle, which lie as those of a spot do."""
+    for k, part in enumerate(now.parts):
+        kind = kind_of(part.feature)
+        if kind.line or kind.sign < 0:
+            continue
+        spot: Any = part.shape
+        free = points  # of the crests that no other part holds
+        for other in now.parts[:k] + now.parts[k + 1 :]:
+            free = free[distances(free, axis_of(other)) > now.place.half_width]
+        aside = (free - axis_of(part)) @ spot.spot.axes.T
+        own = aside[np.linalg.norm(aside, axis=1) < NEIGHBOURHOOD_REACH * now.place.half_width]
+        if len(own) < FEWEST_POINTS:
+            continue
+        # the circle of least squares of its equation (Kasa, IEEE Trans. Instrum. Meas. 25, 1976)
+        equation = np.column_stack([2.0 * own, np.ones(len(own))])
+        x, y, rest = np.linalg.lstsq(equation, (own**2).sum(axis=1), rcond=None)[0]
+        turn = np.append(np.linspace(0.0, 2.0 * np.pi, POINTS_OF_LEG)[:-1], 0.0)
+        circle = np.array([x, y]) + np.sqrt(rest + x**2 + y**2) * np.column_stack([np.cos(turn), np.sin(turn)])
+        height = part.feature.height.median
+        wire = _sized(part.feature, kind_made_of(kind.made_of, line=True).name, height, height)
+        ring = _line(wire, axis_of(part) + circle @ spot.spot.axes, now.place)
+        yield [*now.parts[:k], ring, *now.parts[k + 1 :]]
+
+
 def as_point(line: Feature, tip_radius: float) -> Feature | None:
     """The point that may be meant instead of a line which is hardly longer than wide; None of others."""
     kind = kind_of(line)
@@ -479,6 +505,7 @@ PROPOSALS = (
     Proposal("section", lambda now, points: sections(now)),
     Proposal("smoother", lambda now, points: smoother(now)),
     Proposal("straight lines", straight),
+    Proposal("ring", ringed),
     JOIN,
     Proposal("apart", lambda now, points: apart(now)),
     Proposal("between", lambda now, points: between(now)),

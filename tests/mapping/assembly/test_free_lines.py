@@ -219,3 +219,15 @@ def test_burrs_between_which_the_ball_sinks_by_less_than_a_sweep_tells_are_two_r
     one, other = assembled(burrs, 1.5e-3 * np.arange(12))
     assert one.kind == other.kind == "ridge"
     assert abs(abs(one.axis[0, 0] - other.axis[0, 0]) - 0.26e-3) < 0.03e-3
+
+
+def test_a_ring_hardly_wider_than_it_is_felt_is_a_closed_ridge_under_rows_one_way() -> None:
+    """Three rows of the ball of 1 mm feel both sides of a ring of 1.6 mm, a wire of 0.2 mm: crests as round a spot."""
+
+    def ring(x: FloatArray, y: FloatArray) -> FloatArray:
+        aside = np.hypot(x - 0.1e-3, y - 0.15e-3) - 0.8e-3
+        return np.maximum(np.sqrt(np.maximum(1.1e-3**2 - aside**2, 0.0)) - 0.9e-3, 0.0)
+
+    (told,) = assembled(ring, 0.64e-3 * np.arange(-8, 9))
+    assert told.kind == "ridge" and told.closed
+    assert told.height.low < 0.2e-3 < told.height.high
