@@ -20,10 +20,9 @@ CROWDED, CROWDED_PLACES = 10, 1000
 # benches' plates and the shipped scenes have 5 details at most: twice as many, for what is proposed beside them, are
 # not bounded any earlier.
 MOST_FITTED = 40
-# So many fits a detail are tried: of the blocks of a page of braille, searched without a bound, where nothing improves
-# them, those of two domes took 26, of three 41 and 42, of four 62, 16 a detail; where something does, as where a ridge
-# round a ring is three pieces to begin with and two in the end, half as many again, for 1 CPU s in 52
-FITS_OF_DETAIL = 24
+# So many fits a detail are tried where nothing improves them: of the blocks of a page of braille, searched without a
+# bound, those of two domes took 26, of three 41 and 42, of four 62
+FITS_OF_DETAIL = 16
 # Of such fits so many a detail are spent on joining pieces of a line, beyond them: 40 of 10 details, and 80 of 5, which
 # is every pair of them and every pair that is left after that. With both, less than 10 CPU s a detail: 2.9 where 39
 # details and 112 crossings felt each other, 6 in a row of twelve touching wires
