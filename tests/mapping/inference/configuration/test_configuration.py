@@ -305,9 +305,9 @@ def test_a_plate_that_bears_nothing_is_given_nothing_to_explain() -> None:
 
 
 def test_details_that_hide_each_other_are_counted() -> None:
-    # a bump of 0.25 mm, of which a wire of 0.56 mm hides a quarter of its signal-to-noise ratio of 24, and a wire
-    case = run_counts(FIRST_BUILT_WITH + 34)
-    assert case.true == 3 and case.stated[3] > 0.9
+    # two wires, 0.37 and 0.33 mm high, that run 1 to 3 mm beside each other, a third across both, and a bump
+    case = run_counts(FIRST_BUILT_WITH + 57)
+    assert case.true == 4 and case.stated[4] > 0.9
 
 
 def test_where_the_trace_hardly_decides_both_counts_are_stated() -> None:
