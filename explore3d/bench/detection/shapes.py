@@ -34,7 +34,7 @@ INVENTED_SHARE = 0.5
 # A width is off by a factor if all of its interval is so many times too wide, or too narrow
 OFF_FACTOR = 2.0
 # Probability of the intervals that are told
-SAID_PROBABILITY = 0.9
+INTERVAL = 0.9
 # What a trial is, from best to worst
 JUDGEMENTS = ("right", "flagged", "undecided", "wrong size", "off course", "miscounted", "invented", "missed")
 
@@ -134,7 +134,7 @@ def missing_by_chance(count: int) -> int:
     all are as they say. Those of all ten strokes of a star would hold in a third of the trials."""
     from scipy.stats import binom
 
-    return int(binom.ppf(SAID_PROBABILITY, count, 1.0 - SAID_PROBABILITY))
+    return int(binom.ppf(INTERVAL, count, 1.0 - INTERVAL))
 
 
 def _sizes(feature: Feature, felt: FeltShape) -> dict[str, Any]:
