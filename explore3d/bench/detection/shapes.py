@@ -33,8 +33,6 @@ WHOLE_SHARE = 0.95
 INVENTED_SHARE = 0.5
 # A width is off by a factor if all of its interval is so many times too wide, or too narrow
 OFF_FACTOR = 2.0
-# Probability of the intervals that are told
-INTERVAL = 0.9
 # What a trial is, from best to worst
 JUDGEMENTS = ("right", "flagged", "undecided", "wrong size", "off course", "miscounted", "invented", "missed")
 
@@ -122,19 +120,9 @@ def _judgement(record: dict[str, Any]) -> str:
         return "undecided" if record["stated"] else "miscounted"
     if record["covered"] < WHOLE_SHARE or record["strayed"] > 1.0 - WHOLE_SHARE:
         return "off course"
-    missed = [each["flagged"] for each in record["sizes"] if not each["held"]]
-    plainly = missed.count(False)
-    if any(each["off by a factor"] for each in record["sizes"]) or plainly > missing_by_chance(len(record["sizes"])):
+    if any(not each["held"] and not each["flagged"] for each in record["sizes"]):
         return "wrong size"
-    return "flagged" if any(missed) else "right"
-
-
-def missing_by_chance(count: int) -> int:
-    """Of how many of so many features the 90 % intervals may miss the truth: of no more they do in 90 % of trials if
-    all are as they say. Those of all ten strokes of a star would hold in a third of the trials."""
-    from scipy.stats import binom
-
-    return int(binom.ppf(INTERVAL, count, 1.0 - INTERVAL))
+    return "right" if all(each["held"] for each in record["sizes"]) else "flagged"
 
 
 def _sizes(feature: Feature, felt: FeltShape) -> dict[str, Any]:

@@ -2,8 +2,7 @@
 
 Random plates bear none to five details that stand out, bumps and wires, anywhere, so that some overlap. They are swept,
 detected and assembled as a log is; the probability of each number of details is what the accounts of the found ones say
-together. Every detail stands out of what the others leave by more than can be missed: what is hardly felt may be told
-or not, and no count would be the true one.
+together. A detail that leaves too little in the trace to be detected, the others being there, does not count.
 """
 
 from __future__ import annotations
@@ -35,15 +34,15 @@ LOWEST_COUNTED, HIGHEST_COUNTED, WHITE = 0.15e-3, 0.6e-3, 0.2e-3
 SHORTEST_WIRE, LONGEST_WIRE = 6e-3, 20e-3
 # Standard deviation of the place of one that lies beside another, m: the half-width of the disturbance of the highest
 BESIDE = 3.5e-3
-# What leaves less than so many standard deviations over what the others leave may be missed: the threshold of crossings
-# at 0.01 false alarms a metre is 5 to 6
+# What leaves less than so many standard deviations over what the others leave cannot be counted: the threshold of
+# crossings at 0.01 false alarms a metre is 5 to 6
 COUNTED_SNR = 8.0
 DECILES = np.linspace(0.0, 1.0, 11)
 
 
 @dataclass(frozen=True)
 class CountCase:
-    """One plate: how many details it bears, and the probability that was stated of each number.
+    """One plate: how many details it bears that leave a trace, and the probability that was stated of each number.
 
     `without` names the proposal that was not made.
     """
@@ -58,35 +57,27 @@ class CountCase:
 def run_counts(seed: int, without: str = "") -> CountCase:
     """Draw a plate, sweep it, and count."""
     rng = np.random.default_rng([7, seed])
-    true = int(rng.integers(0, MOST_DETAILS + 1))
-    paths, heights = felt_plate(true, rng)
-    trace, base = record(paths, heights + WHITE * rng.standard_normal(len(heights))), plate()
+    details: list[Feature] = []
+    for _ in range(int(rng.integers(0, MOST_DETAILS + 1))):
+        details.append(drawn(rng, details))
+    offset = rng.uniform(0.0, COUNTED_PITCH)
+    paths = [
+        straight_path((-COUNTED_HALF_SIDE, y), (COUNTED_HALF_SIDE, y))
+        for y in np.arange(-COUNTED_HALF_SIDE, COUNTED_HALF_SIDE, COUNTED_PITCH) + offset
+    ]
+    feet: FloatArray = np.concatenate(paths)
+    up = np.tile([0.0, 0.0, 1.0], (len(feet), 1))
+    tip = record([feet], np.zeros(len(feet))).tip_radius
+    each = np.array([feature_trace(detail, feet, up, tip) for detail in details]).reshape(len(details), len(feet))
+    heights = each.max(axis=0, initial=0.0)
+    rests = [np.delete(each, k, axis=0).max(axis=0, initial=0.0) for k in range(len(details))]
+    true = sum(float(np.linalg.norm(heights - rest)) > COUNTED_SNR * WHITE for rest in rests)
+    trace, base = record(paths, heights + WHITE * rng.standard_normal(len(feet))), plate()
     start = time.process_time()
     laid = LaidTrace.of(trace, base)
     proposals = [proposal for proposal in PROPOSALS if proposal.name != without]
     features = assemble(detect(laid, base), laid, base, proposals=proposals)
     return CountCase(seed, true, stated_counts(features), time.process_time() - start, without)
-
-
-def felt_plate(count: int, rng: np.random.Generator) -> tuple[list[FloatArray], FloatArray]:
-    """Sweeps over a plate, and heights (N,) that so many details leave along them, m: drawn until each is felt."""
-    while True:
-        details: list[Feature] = []
-        for _ in range(count):
-            details.append(drawn(rng, details))
-        offset = rng.uniform(0.0, COUNTED_PITCH)
-        paths = [
-            straight_path((-COUNTED_HALF_SIDE, y), (COUNTED_HALF_SIDE, y))
-            for y in np.arange(-COUNTED_HALF_SIDE, COUNTED_HALF_SIDE, COUNTED_PITCH) + offset
-        ]
-        feet: FloatArray = np.concatenate(paths)
-        up = np.tile([0.0, 0.0, 1.0], (len(feet), 1))
-        tip = record([feet], np.zeros(len(feet))).tip_radius
-        each = np.array([feature_trace(detail, feet, up, tip) for detail in details]).reshape(count, len(feet))
-        heights = each.max(axis=0, initial=0.0)
-        rests = [np.delete(each, k, axis=0).max(axis=0, initial=0.0) for k in range(count)]
-        if all(np.linalg.norm(heights - rest) > COUNTED_SNR * WHITE for rest in rests):
-            return paths, heights
 
 
 def drawn(rng: np.random.Generator, others: Sequence[Feature] = ()) -> Feature:

@@ -89,18 +89,6 @@ def test_a_letter_may_be_cut_into_strokes_where_they_meet_or_bend() -> None:
     )
 
 
-def test_of_many_strokes_as_many_sizes_may_miss_as_90_percent_intervals_do() -> None:
-    felt = felt_shape("A", BUILT)
-    legs, bar = felt.courses
-    strokes = [legs[: len(legs) // 2 + 1 : 20], legs[len(legs) // 2 :: 20], bar[::20]]
-    off = Interval(0.5 * felt.height, 0.4 * felt.height, 0.6 * felt.height)
-    right = [told(felt, stroke) for stroke in strokes]
-    wrong = [told(felt, stroke, height=off) for stroke in strokes]
-    assert judged(felt, [wrong[0], *right[1:]])["judged"] == "right"
-    assert judged(felt, [*wrong[:2], right[2]])["judged"] == "wrong size"
-    assert [shapes.missing_by_chance(count) for count in (1, 2, 10)] == [0, 1, 2]
-
-
 def test_sizes_hold_or_are_bounds_or_are_remarked_upon() -> None:
     felt = felt_shape("S 30 mm", BUILT)
     axis = felt.courses[0][::20]
