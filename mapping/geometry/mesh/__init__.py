@@ -40,7 +40,6 @@ if TYPE_CHECKING:
         directions as directions,
         distances as distances,
         middle as middle,
-        nearest_leg as nearest_leg,
         nearest_on as nearest_on,
         resample as resample,
     )
@@ -81,7 +80,7 @@ _PUBLIC = {
     "clip": ("FELT_SIDE_COSINE", "asked_part", "clipped", "faces_side"),
     "nearest": ("CREASE_ANGLE", "BoxedPoints", "MovedNearestPoint", "NearestPoint", "side_bulges", "unit_vectors"),
     "open3d_import": ("open3d",),
-    "polyline": ("arclengths", "directions", "distances", "middle", "nearest_leg", "nearest_on", "resample"),
+    "polyline": ("arclengths", "directions", "distances", "middle", "nearest_on", "resample"),
     "threads": ("NEAREST_COST", "algebra_in_one_thread", "by_shares", "cores"),
     "tree": ("TriangleTree",),
     "triangle_kernels": ("closest_on_triangle", "closing_step", "enter_face", "enter_triangle"),

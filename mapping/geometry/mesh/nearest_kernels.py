@@ -103,7 +103,7 @@ def nearest_triangle(rows, order, leaves, boxes, links, o, guess, stack, apart, 
 
 
 @borrowing
-def nearest_on_legs(points, polyline, lengths, on, along, leg):  # type: ignore[no-untyped-def]
+def nearest_on_legs(points, polyline, lengths, on, along):  # type: ignore[no-untyped-def]
     """Write the nearest point of a polyline to each point, on the first of equally near legs, and its arclength.
 
     Args:
@@ -111,13 +111,11 @@ def nearest_on_legs(points, polyline, lengths, on, along, leg):  # type: ignore[
         polyline: (K, 3) m, two points or more.
         lengths: (K,) arclength of each of its points, m.
         on, along: (N, 3) and (N,) m.
-        leg: (N,) number of the leg.
     """
     for n in range(len(points)):
         x, y, z = points[n, 0], points[n, 1], points[n, 2]
         least = inf
         on[n, 0] = on[n, 1] = on[n, 2] = along[n] = nan
-        leg[n] = 0
         for k in range(len(polyline) - 1):
             ax, ay, az = polyline[k, 0], polyline[k, 1], polyline[k, 2]
             u, v, w = polyline[k + 1, 0] - ax, polyline[k + 1, 1] - ay, polyline[k + 1, 2] - az
@@ -130,4 +128,3 @@ def nearest_on_legs(points, polyline, lengths, on, along, leg):  # type: ignore[
                 least = apart
                 on[n, 0], on[n, 1], on[n, 2] = px, py, pz
                 along[n] = lengths[k] + share * sqrt(square)
-                leg[n] = k

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapping import FloatArray, IntArray
+from mapping import FloatArray
 
 
 def arclengths(points: FloatArray) -> FloatArray:
@@ -52,25 +52,14 @@ def nearest_on(points: FloatArray, polyline: FloatArray) -> tuple[FloatArray, Fl
     """The nearest point (N, D) of a polyline (K, D) to each of (N, D) points, and its arclength (N,), m; D = 2, 3."""
     if len(polyline) == 1:
         return np.broadcast_to(polyline[0], points.shape).copy(), np.zeros(len(points))
-    on, along, _ = _on_legs(points, polyline)
-    return on, along
-
-
-def nearest_leg(points: FloatArray, polyline: FloatArray) -> IntArray:
-    """(N,) number of the leg of a polyline (K, D), two points or more, that is nearest to each of (N, D) points."""
-    return _on_legs(points, polyline)[2]
-
-
-def _on_legs(points: FloatArray, polyline: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
-    """What is nearest on a polyline (K, D): points (N, D), their arclengths (N,), m, and the legs (N,)."""
     from mapping.geometry.mesh.nearest_kernels import nearest_on_legs
 
     size = points.shape[1]
     at, line = (np.zeros((len(each), 3)) for each in (points, polyline))  # in the plane there is no third coordinate
     at[:, :size], line[:, :size] = points, polyline
-    on, along, leg = np.empty(at.shape), np.empty(len(at)), np.empty(len(at), dtype=np.int64)
-    nearest_on_legs(at, line, arclengths(line), on, along, leg)
-    return on[:, :size], along, leg
+    on, along = np.empty(at.shape), np.empty(len(at))
+    nearest_on_legs(at, line, arclengths(line), on, along)
+    return on[:, :size], along
 
 
 def distances(points: FloatArray, axis: FloatArray) -> FloatArray:

@@ -11,7 +11,6 @@ import numpy as np
 
 from mapping import CourseError, FloatArray, IntArray
 from mapping.base import Base, between_walls, onto_base
-from mapping.geometry.mesh import nearest_leg
 from mapping.inference.curves.body_edge import Wall, up_to_edges
 
 
@@ -68,7 +67,20 @@ class Chart:
 
     def coordinates(self, points: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
         """Distance along the curve, signed lateral distance (n,) and nearest leg of points (n, 3) on the base, m."""
-        nearest = nearest_leg(points, self.points)
+        start, leg = self.points[:-1], np.diff(self.points, axis=0)
+        square = np.maximum(np.einsum("ij,ij->i", leg, leg), np.finfo(float).tiny)
+        share = (points @ leg.T - np.einsum("ij,ij->i", start, leg)) / square
+        share = np.clip(share, 0.0, 1.0)
+        # |p - (start + share leg)|^2 without an (n, K, 3) array
+        cross = points @ start.T
+        gap = (
+            np.einsum("ij,ij->i", points, points)[:, None]
+            - 2.0 * (cross + share * (points @ leg.T))
+            + np.einsum("ij,ij->i", start, start)
+            + 2.0 * share * np.einsum("ij,ij->i", start, leg)
+            + share**2 * square
+        )
+        nearest = np.argmin(gap, axis=1)
         s, lateral = self._on_leg(points, nearest)
         return s, lateral, nearest
 

@@ -7,7 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from mapping.geometry.mesh import arclengths, nearest_leg, nearest_on
+from mapping.geometry.mesh import arclengths, nearest_on
 
 
 @pytest.mark.parametrize("size", [2, 3])
@@ -24,8 +24,6 @@ def test_the_nearest_point_is_that_of_the_nearest_leg(size: int) -> None:
     np.testing.assert_allclose(on, [every[n, k] for n, k in enumerate(apart.argmin(axis=1))], atol=1e-14)
     ways = np.column_stack([np.interp(along, arclengths(axis), axis[:, i]) for i in range(size)])
     np.testing.assert_allclose(ways, on, atol=1e-13)
-    legs = nearest_leg(points, axis)
-    np.testing.assert_allclose(apart[np.arange(len(points)), legs], apart.min(axis=1), atol=1e-14)
 
 
 def test_a_long_recording_and_a_long_axis_need_little_memory() -> None:
