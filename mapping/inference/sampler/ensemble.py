@@ -89,6 +89,8 @@ def sample_ensemble(
         moves = [(move, (1.0 - INDEPENDENT) * weight) for move, weight in moves]
         moves.append((package.moves.MHMove(_independent(proposal)), INDEPENDENT))
     sampler = package.EnsembleSampler(*starts.shape, target.log_density, moves=moves, vectorize=True)
+    # emcee's own form of it prints all walkers and a traceback of whatever passes through: of an interruption, too
+    sampler.log_prob_fn = target.log_density
     _seed(sampler, rng)
     state, tau, look = starts, np.inf, FIRST_LOOK
     while True:

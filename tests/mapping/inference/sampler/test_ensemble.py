@@ -39,6 +39,20 @@ def test_the_ensemble_has_the_variance_of_its_target_at_every_scale(scale):
     np.testing.assert_allclose(ratio, 1.0, atol=5 * np.sqrt(2 / chain.ess))
 
 
+def test_an_interruption_passes_through_in_silence(capfd):
+    """emcee would print all walkers and a traceback before what ends the run says so itself."""
+
+    @dataclass(frozen=True)
+    class Interrupted:
+        def log_density(self, theta):
+            raise KeyboardInterrupt
+
+    rng = np.random.default_rng(0)
+    with pytest.raises(KeyboardInterrupt):
+        sample_ensemble(Interrupted(), rng.standard_normal((8, 2)), rng)
+    assert capfd.readouterr() == ("", "")
+
+
 def test_an_ensemble_that_cannot_move_says_so():
     @dataclass(frozen=True)
     class Spike:
