@@ -72,6 +72,7 @@ def assemble(
     inspections = inspections or inspected_for(detections, laid, base, spacing=spacing, faint=faint)
     spacing = place_spacing(crossings, trace.tip_radius) if spacing is None and crossings else spacing
     wide, flat, round_it = list[Feature](), list[Feature](), list[Feature]()
+    around = Surroundings(laid, base, detections.noise.rounded(laid.resolution))
     if spacing is not None and crossings:
         plain = Around(inspections.at(spacing), base, detections, trace.tip_radius)
         flat, crossings = plateau_features(crossings, plain)
@@ -91,11 +92,12 @@ def assemble(
         if wide and looked is not None:
             beside = _linked(replace(detections, crossings=crossings), laid, looked)
             lost = outweighed(wide, beside, _linked(detections, laid, looked), looked, laid.tip_radius)
-            around = Surroundings(laid, base, detections.noise.rounded(laid.resolution))
-            lost = [
-                out or (bool(proposals) and is_two(line, _places(looked), around, false_alarms_per_metre))
-                for line, out in zip(wide, lost, strict=True)
-            ]
+            if proposals:
+                places = _places(looked)
+                lost = [
+                    out or is_two(line, places, around, false_alarms_per_metre)
+                    for line, out in zip(wide, lost, strict=True)
+                ]
             if any(lost):
                 wide = [feature for feature, out in zip(wide, lost, strict=True) if not out]
                 crossings = _off_lines(detections.crossings, wide, stepped, looked)
@@ -103,7 +105,6 @@ def assemble(
     features = flat if spacing is None else [*flat, *_linked(detections, laid, inspections.at(spacing))]
     if features and spacing is not None and proposals:
         places = _places(inspections.at(spacing))
-        around = Surroundings(laid, base, detections.noise.rounded(laid.resolution))
         alone = [feature for feature in wide if len(feature.axis) == 1 and feature.evidence.crossings == 1]
         features, left = accounted(features, crossings, places, around, false_alarms_per_metre, proposals, alone)
         wide = [feature for feature in wide if feature not in alone or feature in left]

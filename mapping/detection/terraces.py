@@ -88,9 +88,10 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
     passed = int((2.0 * np.sqrt(tip_radius * on) + 2.0 * MEAN * tip_radius) / profile.spacing)
     runs = _runs(own.argmin(axis=1), own.min(axis=1) < on, reach, max(passed, TERRACE_BINS))
     runs = _up_to_edges(runs, reach, smooth, levels)
+    bounds = [np.sort(levels[[here, there]]) for (_, _, here), (_, _, there) in itertools.pairwise(runs)]
     upon = [
-        _beyond(smooth, begin, last, np.sort(levels[[here, there]]), on)
-        for (begin, _, here), (_, last, there) in itertools.pairwise(runs)
+        _beyond(smooth, begin, last, between, on)
+        for ((begin, _, _), (_, last, _)), between in zip(itertools.pairwise(runs), bounds, strict=True)
     ]
     # a long way from one level to the next is no edge, and the base's levels are none of this sweep's
     bare = [
@@ -103,7 +104,9 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
     rounded = int((MEAN * tip_radius + np.sqrt(2 * tip_radius * on)) / profile.spacing) + 1
     height, edges = profile.height - levels[runs[0][2]], []
     level = np.full(len(height), levels[runs[-1][2]])
-    for ((begin, end, here), (onward, last, there)), stands in zip(itertools.pairwise(runs), upon, strict=True):
+    for ((begin, end, here), (onward, last, there)), between, stands in zip(
+        itertools.pairwise(runs), bounds, upon, strict=True
+    ):
         height[onward:] += levels[here] - levels[there]
         # the way from one to the other is no path over a base: the terrace behind it stands in, with its noise; a part
         # of every terrace is left, however short it is, coarse the bins and strong the noise
@@ -117,14 +120,14 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
         # details of the two terraces are none of the edge's, nor is what stands upon it: that is one of the nearer
         # level
         plain = profile.height.copy()
-        plain[stands] = np.clip(plain[stands], *np.sort(levels[[here, there]]))
+        plain[stands] = np.clip(plain[stands], *between)
         upon_edge = way[stands[way]]
         level[upon_edge] = plain[upon_edge]
         height[upon_edge] = profile.height[upon_edge] - plain[upon_edge]
         farther = slice(begin, max(begin, end - reach)), slice(min(onward + reach, last), last)
         for ground, detail in zip((here, there), farther, strict=True):
-            stands = np.abs(plain[detail] - levels[ground]) >= FEATURE_RESIDUAL_SDS * noise
-            plain[detail][stands] = levels[ground]
+            stands_off = np.abs(plain[detail] - levels[ground]) >= FEATURE_RESIDUAL_SDS * noise
+            plain[detail][stands_off] = levels[ground]
         start, stop = max(begin, end - EDGE_TERRACES * reach), min(last, onward + EDGE_TERRACES * reach)
         piece = _piece(replace(profile, height=plain - min(levels[here], levels[there])), start, stop)
         up = levels[there] > levels[here]

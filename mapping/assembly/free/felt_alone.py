@@ -22,7 +22,8 @@ from mapping.geometry.mesh import distances
 from mapping.inference.kinds import sizes_of
 from mapping.instrument import Noise
 
-# Most places of a section that its distance from what is told is taken at
+# Most places of a section that its distance from what is told is taken at: two to the reach of a detail, of one that
+# reaches a hundredth of the section's extent or more
 PLACES_OF_SECTION = 200
 
 
