@@ -123,10 +123,10 @@ def fit_base(
     if form.kind == "auto" and all(_missed(fit, cloud) > EXPLAINED for fit in fits if "levels" not in fit.parameters):
         if not _ends_in_a_plane(cloud):
             fits += _fits((extrusion,), cloud)
-        if all(_missed(fit, cloud) > EXACTLY for fit in fits):
+        if _unexplained(fits, cloud):
             bodies = _last_resort((polyhedron,), cloud)
             fits += [body for body in bodies if not _walked_through(body, cloud, trace)]
-        if all(_missed(fit, cloud) > EXACTLY for fit in fits):
+        if _unexplained(fits, cloud):
             fits += _last_resort(FREE, cloud)
     residual = min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual
     scale, share = _noise_of(residual, cloud)
@@ -197,6 +197,11 @@ def _last_resort(families: Iterable[Family], cloud: Cloud) -> list[Fitted]:
 def _missed(fit: Fitted, cloud: Cloud) -> float:
     """Distance within which half of the cells lie from the fitted surface, in the scatter of neighbouring cells."""
     return float(np.median(np.abs(fit.residual))) / cloud.floor
+
+
+def _unexplained(fits: Iterable[Fitted], cloud: Cloud) -> bool:
+    """True if nothing explains most of the cells by as much as they scatter."""
+    return all(_missed(fit, cloud) > EXACTLY for fit in fits if fit.explains)
 
 
 def _noise_of(residual: FloatArray, cloud: Cloud) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -25,6 +25,13 @@ ASKED_FOR_NORMAL = 500
 OTHER_PASS = 2.0
 # Cosine of the least angle to the path at which a line to a neighbour tells the normal
 HALF_RIGHT = float(np.sqrt(0.5))
+# Facets of a height field's mesh along both axes at least, and of each piece of its spline: where this is as bent as
+# the ball, which it is at most, they lie within 0.01 radii of it (pieces of 2.5 radii: 2.5 / 12 squared over 8 is
+# 0.005)
+FEWEST_FACETS, FACETS_OF_PIECE = 96, 12
+# Cells to each coefficient of a spline, at least, of which one in four may stand off it; and pieces along an axis from
+# which on longer ones are taken if that asks for it: fewer are no sheet of many waves, but too few cells
+CELLS_OF_COEFFICIENT, SHORT_OF_CELLS = 4, 8
 
 
 # Columns (N, P) of a field that is linear in its coefficients, at x and y (N,)
@@ -163,7 +170,8 @@ class Fitted:
     """A fitted family: its kind, its parameters (JSON values), the misses (C,) m, their freedom, and how to mesh it.
 
     A parameter of a simple family must pay as much as makes it true in the end (Schwarz's criterion); of families that
-    nothing simple stands in for, the one that predicts best is wanted (Akaike's).
+    nothing simple stands in for, the one that predicts best is wanted (Akaike's). What does not explain the cells,
+    however near it comes to them, keeps no freer family from being tried.
     """
 
     kind: str
@@ -172,6 +180,7 @@ class Fitted:
     freedom: int
     mesh: Callable[[Cloud, float | None], Surface]
     last_resort: bool = False
+    explains: bool = True
 
     def cost(self, scale: float, share: float = 1.0) -> float:
         """Truncated chi-square at a scale (m) plus the price of the parameters; lower is better.
@@ -188,13 +197,19 @@ class Fitted:
 
 
 def height_field(
-    design: Design, kind: str, cloud: Cloud, bends: FloatArray | None = None, among: BoolArray | None = None
+    design: Design,
+    kind: str,
+    cloud: Cloud,
+    bends: FloatArray | None = None,
+    among: BoolArray | None = None,
+    pieces: tuple[int, int] = (1, 1),
 ) -> Fitted:
     """A height field z = design(x, y) @ coefficients over the principal plane.
 
     Args:
         bends: (B, P) rows of which each times the coefficients is 0 +- 1: what holds where nothing was felt.
         among: (C,) cells that it is fitted to; None: all.
+        pieces: of its spline along both axes.
     """
     x, y, z = cloud.points.T
     prior = np.zeros((0, design(x[:1], y[:1]).shape[1])) if bends is None else cloud.floor * bends
@@ -204,24 +219,31 @@ def height_field(
     def height(u: FloatArray, v: FloatArray) -> FloatArray:
         return np.asarray(design(u, v) @ fit.coefficients)
 
-    cells = 1 if kind == "plane" else 96
+    across = (1, 1) if kind == "plane" else tuple(max(FEWEST_FACETS, FACETS_OF_PIECE * n) for n in pieces)
     return Fitted(
         kind,
         {"coefficients": fit.coefficients.tolist()},
         fit.residual[: len(z)] if among is None else z - columns @ fit.coefficients,
         len(fit.coefficients),
-        lambda cloud, spacing: _height_mesh(height, cells, cloud, spacing),
+        lambda cloud, spacing: _height_mesh(height, across, cloud, spacing),
     )
 
 
 def _height_mesh(
-    height: Callable[[FloatArray, FloatArray], FloatArray], cells: int, cloud: Cloud, spacing: float | None
+    height: Callable[[FloatArray, FloatArray], FloatArray],
+    facets: Sequence[int],
+    cloud: Cloud,
+    spacing: float | None,
 ) -> Surface:
-    """A grid over the cloud's extent, moved one tip radius inward along the sheet's normals."""
+    """A grid over the cloud's extent of so many facets along both axes, moved one tip radius inward along the sheet's
+    normals."""
     low, high = cloud.extent
     margin = cloud.margin
     ends = [(float(low[i]) - margin, float(high[i]) + margin) for i in range(2)]
-    u, v = (np.linspace(*end, 1 + max(cells, pieces_of(end[1] - end[0], spacing))) for end in ends)
+    u, v = (
+        np.linspace(*end, 1 + max(least, pieces_of(end[1] - end[0], spacing)))
+        for end, least in zip(ends, facets, strict=True)
+    )
     # Beyond the data a polynomial says nothing: the sheet goes on straight from its border.
     uu, vv = (g.ravel() for g in np.meshgrid(u, v, indexing="ij"))
     step = 1e-4 * max(float(high[0] - low[0]), float(high[1] - low[1]))
@@ -285,13 +307,17 @@ def _tells(cloud: Cloud, axis: int, count: int) -> bool:
 
 
 def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
-    """A bicubic spline sheet; its pieces are no shorter than so many tip radii, nor than the rows tell apart."""
+    """A bicubic spline sheet; its pieces are no shorter than so many tip radii, nor than the rows tell apart, and where
+    the cloud has too few cells for them longer, but for SHORT_OF_CELLS of them along an axis."""
     low, high = cloud.extent
-    pieces = [int(min(8, (high[i] - low[i]) / (shortest * cloud.tip_radius))) for i in range(2)]
+    pieces = [int((high[i] - low[i]) / (shortest * cloud.tip_radius)) for i in range(2)]
     pieces = [
         max((n for n in range(1, most + 1) if _tells(cloud, i, n + 3)), default=0) for i, most in enumerate(pieces)
     ]
-    if min(pieces) < 1 or len(cloud.points) < 4 * (pieces[0] + 3) * (pieces[1] + 3):
+    room = len(cloud.points) // CELLS_OF_COEFFICIENT
+    while (pieces[0] + 3) * (pieces[1] + 3) > room and max(pieces) > SHORT_OF_CELLS:
+        pieces[int(np.argmax(pieces))] -= 1
+    if min(pieces) < 1 or (pieces[0] + 3) * (pieces[1] + 3) > room:
         return None
     knots = [
         np.concatenate([[low[i]] * 3, np.linspace(low[i], high[i], pieces[i] + 1), [high[i]] * 3]) for i in range(2)
@@ -308,7 +334,7 @@ def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
         for i in range(2)
     )
     bends = np.vstack([np.kron(along, np.eye(count[1])), np.kron(np.eye(count[0]), across)])
-    return height_field(design, "sheet", cloud, bends)
+    return height_field(design, "sheet", cloud, bends, pieces=(pieces[0], pieces[1]))
 
 
 def sphere(cloud: Cloud) -> Fitted | None:

@@ -56,11 +56,15 @@ class _Levels:
     sweep: IntArray
 
     @property
-    def freedom(self) -> int:
-        """Of the levels beyond the first and of the places on sweeps where one gives way to another."""
+    def edges(self) -> int:
+        """Places on sweeps where one level gives way to another."""
         standing, sweep = self.level[self.level >= 0], self.sweep[self.level >= 0]
-        edges = int(((np.diff(standing) != 0) & (np.diff(sweep) == 0)).sum())
-        return len(self.heights) - 1 + EDGE_FREEDOM * edges
+        return int(((np.diff(standing) != 0) & (np.diff(sweep) == 0)).sum())
+
+    @property
+    def freedom(self) -> int:
+        """Of the levels beyond the first and of their edges."""
+        return len(self.heights) - 1 + EDGE_FREEDOM * self.edges
 
 
 def terraced_plane(cloud: Cloud) -> Fitted | None:
@@ -112,7 +116,11 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
     slope = np.asarray(flat.parameters["coefficients"], dtype=np.float64)[1:3]
     heights = levels.heights / np.sqrt(1.0 + slope @ slope)
     return replace(
-        flat, parameters=flat.parameters | {"levels": heights.tolist()}, freedom=flat.freedom + levels.freedom
+        flat,
+        parameters=flat.parameters | {"levels": heights.tolist()},
+        freedom=flat.freedom + levels.freedom,
+        # rows that each stand on a level of their own may be those of any body
+        explains=levels.edges >= len(levels.heights) - 1,
     )
 
 

@@ -8,6 +8,7 @@ import pytest
 from mapping.arrays import FloatArray
 from mapping.base.base import Base
 from mapping.base.fit import fit_base
+from mapping.base.quadrics import Cloud, sheet
 from mapping.trace import Trace
 
 TIP, NOISE = 0.01, 2e-5
@@ -150,3 +151,17 @@ def test_a_bore_is_a_hollow_cylinder_where_the_contacts_say_so() -> None:
     assert base.parameters["radius"] == pytest.approx(0.03, abs=NOISE)
     assert missed(base, lines).max() < NOISE
     assert fit_base(swept(lines)).parameters["radius"] == pytest.approx(0.01, abs=NOISE), "else it is a rod"
+
+
+def test_a_sheet_follows_as_many_waves_as_it_has_pieces_for() -> None:
+    # five waves, each of twelve radii
+    x = np.linspace(0.0, 0.6, 2000)
+    lines = [
+        np.column_stack([x, np.full_like(x, y), 1.5e-3 * np.sin(2.0 * np.pi * x / 0.12) + TIP])
+        for y in np.linspace(0.0, 0.08, 9)
+    ]
+    trace = swept(lines)
+    fit = sheet(Cloud.of(trace, 4000), shortest=2.5)
+    assert fit is not None and np.median(np.abs(fit.residual)) < 2.0 * NOISE
+    base = Base(fit.surface(Cloud.of(trace, 4000), None), fit.kind, fit.parameters)
+    assert np.median(missed(base, lines)) < NOISE

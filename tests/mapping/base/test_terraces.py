@@ -10,6 +10,8 @@ import pytest
 from explore3d.bench.scenes import FIRST_BUILT_WITH, section_trace
 from mapping import FloatArray, Trace
 from mapping.base import Base, fit_base
+from mapping.base.quadrics import Cloud, Fitted
+from mapping.base.terraces import terraced_plane
 from mapping.geometry.templates import step_height
 
 TIP, NOISE = 1e-3, 5e-6
@@ -81,3 +83,14 @@ def test_two_crests_side_by_side_are_no_level() -> None:
     """Between them the ball comes down by a third: the trace stays for long at about one height, and passes through."""
     base = fit_base(section_trace("crack with burrs", "10um", FIRST_BUILT_WITH + 2))
     assert base.kind == "plane" and levels(base) == [0.0]
+
+
+def test_rows_on_levels_that_no_sweep_climbs_may_be_those_of_any_body() -> None:
+    def fitted(height: Callable[[FloatArray, FloatArray], FloatArray]) -> Fitted:
+        found = terraced_plane(Cloud.of(raster(height), 2000))
+        assert found is not None
+        return found
+
+    assert fitted(lambda u, v: step_height(u - EDGE, 0.3e-3, TIP)).explains
+    # lines along waves stand where these are level, each for itself
+    assert not fitted(lambda u, v: 2e-3 * np.round(np.sin(v / 5e-3))).explains
