@@ -29,9 +29,9 @@ HALF_RIGHT = float(np.sqrt(0.5))
 # the ball, which it is at most, they lie within 0.01 radii of it (pieces of 2.5 radii: 2.5 / 12 squared over 8 is
 # 0.005)
 FEWEST_FACETS, FACETS_OF_PIECE = 96, 12
-# Cells to each coefficient of a spline, at least, of which one in four may stand off it; and pieces along an axis from
-# which on longer ones are taken if that asks for it: fewer are no sheet of many waves, but too few cells
-CELLS_OF_COEFFICIENT, SHORT_OF_CELLS = 4, 8
+# Coefficients of a sheet: a bound on the time, which grows with their cube (300 take 0.8 CPU s). Pieces are longer
+# where more would be needed, down to so many along an axis, of which both axes together fit the bound
+MOST_COEFFICIENTS, FEWEST_PIECES = 300, 8
 
 
 # Columns (N, P) of a field that is linear in its coefficients, at x and y (N,)
@@ -307,17 +307,18 @@ def _tells(cloud: Cloud, axis: int, count: int) -> bool:
 
 
 def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
-    """A bicubic spline sheet; its pieces are no shorter than so many tip radii, nor than the rows tell apart, and where
-    the cloud has too few cells for them longer, but for SHORT_OF_CELLS of them along an axis."""
+    """A bicubic spline sheet; its pieces are no shorter than so many tip radii, nor than the rows tell apart, and no
+    more than MOST_COEFFICIENTS and the cells can tell."""
     low, high = cloud.extent
-    pieces = [int((high[i] - low[i]) / (shortest * cloud.tip_radius)) for i in range(2)]
+    ideal, most = (high[:2] - low[:2]) / (shortest * cloud.tip_radius), min(MOST_COEFFICIENTS, len(cloud.points) // 4)
+    # as long along both axes; 1.05: none is longer by more than that than it must be
+    while np.prod(ideal.astype(int) + 3) > most and ideal.max() > FEWEST_PIECES + 1:
+        ideal = ideal / 1.05
+    pieces = [int(n) for n in ideal]
     pieces = [
         max((n for n in range(1, most + 1) if _tells(cloud, i, n + 3)), default=0) for i, most in enumerate(pieces)
     ]
-    room = len(cloud.points) // CELLS_OF_COEFFICIENT
-    while (pieces[0] + 3) * (pieces[1] + 3) > room and max(pieces) > SHORT_OF_CELLS:
-        pieces[int(np.argmax(pieces))] -= 1
-    if min(pieces) < 1 or (pieces[0] + 3) * (pieces[1] + 3) > room:
+    if min(pieces) < 1 or len(cloud.points) < 4 * (pieces[0] + 3) * (pieces[1] + 3):
         return None
     knots = [
         np.concatenate([[low[i]] * 3, np.linspace(low[i], high[i], pieces[i] + 1), [high[i]] * 3]) for i in range(2)
