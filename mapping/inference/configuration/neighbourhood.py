@@ -15,7 +15,7 @@ from mapping.geometry.mesh import distances
 from mapping.inference.families import Sizes, Surroundings, tells_of_line
 from mapping.inference.joint import JoinedShape
 from mapping.inference.kinds import kind_of, sizes_of
-from mapping.inference.likelihood import Likelihood, Nuisance, Shape, Window, build_likelihood
+from mapping.inference.likelihood import Likelihood, Shape, Window, build_likelihood
 from mapping.instrument import Noise
 
 # How wrong the shapes of a configuration may be about a real detail, in shares of its height: which of these it is the
@@ -124,8 +124,7 @@ def neighbourhood(
         window = replace(window, height=over_levels(window.height, window.starts[1:-1], around.base.levels))
     height = max([size.height for size in sizes] or [abs(crossing.height) for crossing in crossings])
     half_width = min([size.half_width for size in sizes] or widths)
-    vague = 3.0 * max(height, around.noise.sd)
-    nuisance = Nuisance(vague, vague, 0.0 if around.base.kind == "mesh" else 0.3 * height)
+    nuisance = around.nuisance(height)
     levels = []
     for share in MISFIT_SHARES:
         noise = with_waves(around.noise, share * height, half_width)

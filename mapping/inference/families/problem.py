@@ -72,6 +72,17 @@ class Surroundings:
     others: Sequence[Feature] = ()
     tip_sd: float = 0.0
 
+    def nuisance(self, height: float) -> Nuisance:
+        """What the base may do under each run of bins about a detail of a height (m).
+
+        A base of several levels was fitted to them: what it leaves of a slope is noise. Were it free, it would stand
+        for a step in the little of both levels that a window holds.
+        """
+        vague = 3.0 * max(height, self.noise.sd)
+        if len(self.base.levels) > 1:
+            return Nuisance(vague, self.noise.sd, self.noise.sd)
+        return Nuisance(vague, vague, 0.0 if self.base.kind == "mesh" else 0.3 * height)
+
 
 @dataclass(frozen=True, eq=False)
 class PosteriorProblem:
@@ -108,9 +119,7 @@ class PosteriorProblem:
         beside: Beside | None,
     ) -> Self:
         """With the noise of the surroundings, and what neighbours leave beside the feature."""
-        vague = 3.0 * max(sizes.height, around.noise.sd)
-        bend = 0.0 if around.base.kind == "mesh" else 0.3 * sizes.height
-        nuisance = Nuisance(vague, vague, bend)
+        nuisance = around.nuisance(sizes.height)
         likelihood = _likelihood(window, around.noise, nuisance, sizes.height, None)
         return cls(feature, sizes, LogPosterior(shape, likelihood, beside), around.noise, nuisance, beginnings)
 

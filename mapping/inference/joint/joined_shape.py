@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mapping import FloatArray, IntArray
-from mapping.inference.families import Crossing, GrooveShape, StepShape, TwinShape
+from mapping.inference.families import Crossing, GrooveShape, OffsetRims, StepShape, TwinShape
 from mapping.inference.likelihood import LogPosterior, Prior, Shape
 
 # Places along a line at which it is asked on which side of a step it lies; between two of them the side changes where
@@ -24,8 +24,9 @@ class JoinedShape:
     """Shapes over one window, felt together: their parameters in a row.
 
     Dilation distributes over unions: the highest of ground and crests is felt, at each place within a bin, not in its
-    mean. The ground is base, steps and hollows, whose depths add but where grooves cross; the part of a crest that
-    stands on the high side of a step is higher by that step, and is felt from the low side too.
+    mean. The ground is base, steps and hollows, whose depths add but where grooves cross or run along a step's edge;
+    the part of a crest that stands on the high side of a step is higher by that step, and is felt from the low side
+    too.
 
     Args:
         shapes: over a window that has `fine` bins for each one of the likelihood's.
@@ -78,6 +79,9 @@ class JoinedShape:
         if self._crossing is not None:
             crossed = _Distinct.of(self._crossed, np.hstack([own[k] for k in self._grooves]))
             felt += crossed.heights[crossed.which]
+        for (groove, edge), rims in self._offset_rims.items():
+            beside = _Distinct.of(rims.heights, np.hstack([own[groove], own[edge]]))
+            felt += beside.heights[beside.which]
         # a crest beside a hollow holds the ball that sinks into it: crests are known as far down as it does
         sunk = max(-float(felt.min(initial=0.0)), 0.0)
         every = ((self._all[k], piece) for k in self._varied for piece in self._crests(k, own, sunk))
@@ -105,6 +109,12 @@ class JoinedShape:
             return None
         crossing = Crossing.of(list(self._grooves.values()))
         return crossing if len(crossing.bin) else None
+
+    @cached_property
+    def _offset_rims(self) -> dict[tuple[int, int], OffsetRims]:
+        """Each groove beside each step, by their numbers."""
+        steps = [(k, shape) for k, shape in enumerate(self._all) if isinstance(shape, StepShape)]
+        return {(g, k): OffsetRims(groove, step) for g, groove in self._grooves.items() for k, step in steps}
 
     def _crossed(self, theta: FloatArray) -> FloatArray:
         """(W, n) what the grooves leave together more than the sum, m, of their parameters (W, P) in a row."""

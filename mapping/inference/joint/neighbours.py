@@ -166,8 +166,7 @@ def laid_together(features: Sequence[Feature], around: Surroundings) -> Together
     except EmptyWindowError:
         return None
     height = max(size.height for size in sizes)
-    vague = 3.0 * max(height, noise.sd)
-    nuisance = Nuisance(vague, vague, 0.0 if around.base.kind == "mesh" else 0.3 * height)
+    nuisance = replace(around, noise=noise).nuisance(height)
     starts = np.concatenate([np.zeros(0), *(shape.start for shape in theirs)])
     joined = JoinedShape(shapes, len(window), 1, theirs, starts)
     target = LogPosterior(joined, build_likelihood(window, noise, nuisance, MODEL_FLOOR * height))

@@ -9,10 +9,12 @@ import numpy as np
 
 from mapping import EmptyWindowError, Feature, FloatArray
 from mapping.geometry.mesh import arclengths, nearest_on
-from mapping.inference.curves import CurveModes, chart_along
+from mapping.geometry.templates import contact_half_width
+from mapping.inference.curves import Chart, CurveModes, chart_along
 from mapping.inference.families import GrooveShape, PosteriorProblem, Sizes, StepShape, Surroundings
-from mapping.inference.kinds.kind import feature_trace, kind_of, uphill
+from mapping.inference.kinds.kind import feature_trace, kind_of, sizes_of, uphill
 from mapping.inference.likelihood import Beside, Prior, Shape, StudentT, Uniform, Window
+from mapping.instrument import FEATURE_RESIDUAL_SDS
 
 # Prior of log radius: a ball lying on the base (a = H/2) unless the data say otherwise, with heavy tails.
 RADIUS_SCALE = 1.0
@@ -30,9 +32,14 @@ def pose(
         tip = around.trace.tip_radius
         traces = [feature_trace(other, window.feet, window.normals, tip) for other in near]
         beside = felt_beside(feature, near, traces, window.feet, shape if isinstance(shape, StepShape) else None)
-        if type(shape) is GrooveShape:
+        if isinstance(shape, StepShape) or type(shape) is GrooveShape:
             laid = [_laid(other, window, around) for other in near if _is_upright(other)]
-            shape = replace(shape, crossed=tuple(each for each in laid if each is not None))
+            grooves = tuple(each for each in laid if each is not None)
+            if isinstance(shape, StepShape):
+                shape = replace(shape, grooves=grooves)
+            else:
+                edges = [_edge_beside(feature, sizes, other, window, around) for other in near if kind_of(other).sided]
+                shape = replace(shape, crossed=grooves, edges=tuple(each for each in edges if each is not None))
     return PosteriorProblem.posed(feature, sizes, shape, window, around, beginnings, beside)
 
 
@@ -88,18 +95,50 @@ def _is_upright(other: Feature) -> bool:
 def _laid(groove: Feature, window: Window, around: Surroundings) -> tuple[GrooveShape, FloatArray] | None:
     """A groove as it is known over any window, and its parameters (1, P); where the ball hangs it has no bottom. None
     where its axis has no chart: it must not cost the groove that it crosses its posterior."""
-    tip, closed = around.trace.tip_radius, groove.closed
-    spacing = float(arclengths(groove.axis)[-1]) / LEGS_OF_OTHERS
-    reach = 0.5 * groove.width.median
-    try:
-        chart = chart_along(groove.axis, groove.normals, around.base, tip, spacing, 0.0, reach, bends=False)
-    except EmptyWindowError:
+    chart, tip = _chart_of(groove, 0.5 * groove.width.median, around), around.trace.tip_radius
+    if chart is None:
         return None
-    ends = [] if closed else [0.0, float(chart.s[0]), float(chart.s[-1])]
+    ends = [] if groove.closed else [0.0, float(chart.s[0]), float(chart.s[-1])]
     depth = tip if groove.height.censored else -groove.height.median
     known = np.array([0.0, *ends, np.log(groove.width.median), np.log(depth)])
-    modes = CurveModes(0, 0.5 * chart.length, 0.5 * chart.length, closed)
-    return GrooveShape(window, chart, modes, tip, (), known, np.zeros_like(known)), known[None]
+    return GrooveShape(window, chart, _straight(chart), tip, (), known, np.zeros_like(known)), known[None]
+
+
+def _edge_beside(
+    groove: Feature, sizes: Sizes, step: Feature, window: Window, around: Surroundings
+) -> tuple[StepShape, FloatArray, bool] | None:
+    """A step beside a groove as it is known over any window, its parameters (1, P), and True if its edge is a rim.
+
+    Where in the mouth of a groove an edge lies nothing tells, nor on a ledge beyond its lower rim as long as the ball
+    that has sunk by d touches the edge, H higher, instead of that rim: then the edge is no farther off than the
+    half-chord of d + H. None where its axis has no chart, or it is not known which side of it is high.
+    """
+    tip, height = around.trace.tip_radius, abs(step.height.median)
+    chart = _chart_of(step, sizes_of(step, tip).half_width, around)
+    if chart is None or not step.details.high_side:
+        return None
+    low, high = (float(contact_half_width(min(sizes.height + up, tip), 0.0, tip)) for up in (0.0, height))
+    doubt = FEATURE_RESIDUAL_SDS * float(np.hypot(sizes.position_sd, step.position_sd))
+    is_rim = -high - doubt < float(np.median(uphill(step, groove.axis))) < low
+    known, side = np.array([0.0, height]), float(np.sign(step.details.high_side))
+    edge = StepShape(window, chart, _straight(chart), tip, side, (), known, np.zeros_like(known))
+    return edge, known[None], is_rim
+
+
+def _chart_of(line: Feature, reach: float, around: Surroundings) -> Chart | None:
+    """A chart along a line as it is known; None where there is none."""
+    if len(line.axis) < 2:
+        return None
+    spacing = float(arclengths(line.axis)[-1]) / LEGS_OF_OTHERS
+    tip = around.trace.tip_radius
+    try:
+        return chart_along(line.axis, line.normals, around.base, tip, spacing, 0.0, reach, bends=False)
+    except EmptyWindowError:
+        return None
+
+
+def _straight(chart: Chart) -> CurveModes:
+    return CurveModes(0, 0.5 * chart.length, 0.5 * chart.length, chart.closed)
 
 
 def place_prior(sizes: Sizes) -> Prior:

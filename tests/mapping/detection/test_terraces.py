@@ -12,6 +12,7 @@ from mapping.assembly import assemble
 from mapping.base import Base, LaidTrace, fit_base
 from mapping.detection import Detections, detect, terraced
 from mapping.geometry.templates import cap_height, groove_height, step_height
+from mapping.inference.joint import refine_all
 
 TIP, NOISE, LINES = 1e-3, 5e-6, 12
 
@@ -81,6 +82,23 @@ def test_a_bead_upon_an_edge_is_a_ridge_over_the_upper_level() -> None:
     assert sorted(features) == ["ridge", "step"]
     assert features["ridge"].height.median == pytest.approx(0.5e-3, rel=0.05)
     assert features["step"].height.median == pytest.approx(0.2e-3, rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_gap_between_panels_out_of_line_is_a_groove_and_a_step() -> None:
+    def height(x: FloatArray) -> FloatArray:
+        low, high = (step_height(side * x - 0.6e-3, TIP, TIP) - TIP for side in (-1.0, 1.0))
+        return np.maximum(low, np.where(x > -0.6e-3, high + 0.1e-3, -TIP))
+
+    trace = raster(height)
+    base = fit_base(trace)
+    features = {feature.kind: feature for feature in assemble(detect(trace, base), trace, base)}
+    assert sorted(features) == ["groove", "step"]
+    assert features["step"].height.median == pytest.approx(0.1e-3, rel=0.05)
+    refined = {each.kind: each for each in refine_all([*features.values()], trace, 0, base=base, confirm=None)}
+    for kind, true in (("step", 0.1e-3), ("groove", 1.2e-3)):
+        size = refined[kind].height if kind == "step" else refined[kind].width
+        assert size.low < true < size.high and size.high - size.low < 0.7 * true
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
