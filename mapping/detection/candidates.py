@@ -84,36 +84,78 @@ class Searched:
     @property
     def disturbances(self) -> tuple[Disturbance, ...]:
         """Above the threshold, the strongest first; what no ball felt is left out."""
-        return tuple(each for each in self._measured if each.felt)
+        return self.within(None)
 
-    @property
-    def unfelt(self) -> int:
+    def within(self, about: FloatArray | None) -> tuple[Disturbance, ...]:
+        """The same of those alone whose stretch meets one of (M, 2) intervals of arclength, m; None: all of them."""
+        return tuple(each for each in self._measured(about) if each.felt)
+
+    def unfelt(self, about: FloatArray | None = None) -> int:
         """How many are such as no ball draws."""
-        return sum(not each.felt for each in self._measured)
+        return sum(not each.felt for each in self._measured(about))
+
+    def _measured(self, about: FloatArray | None) -> list[Disturbance]:
+        """All above the threshold, or those that meet one of the intervals: measured when they are asked for, which
+        costs most of a search."""
+        found = list[Disturbance]()
+        for number, (_, low, high, _, _, _) in enumerate(self._crests):
+            begin, end = (self.profile.start + self.profile.spacing * place for place in (low, high - 1))
+            met = about is None or bool(((about[:, 0] <= end) & (about[:, 1] >= begin)).any())
+            if met and (new := self._disturbance(number)) is not None:
+                found.append(new)
+        return found
+
+    def _disturbance(self, number: int) -> Disturbance | None:
+        """What a crest is, if it is certain and no side lobe of one before it."""
+        if number not in self._known:
+            new = self._fitted(number)
+            certain = abs(new.height) >= MEASURED * self.threshold * new.height_sd and new.snr >= self.threshold
+            self._known[number] = new if certain and not self._is_side_lobe(number, new) else None
+        return self._known[number]
+
+    def _is_side_lobe(self, number: int, new: Disturbance) -> bool:
+        """True if a crest before this one explains it: of those alone that reach so far it is asked what they are."""
+        profile, drift = self.profile, self.bank.drift > 0
+        for before, (_, low, high, _, _, _) in enumerate(self._crests[:number]):
+            length = (high - 1 - low) * profile.spacing
+            begin = profile.start + low * profile.spacing
+            away = max(begin - new.place, new.place - begin - length, 0.0)
+            if away < _reach(length, new, drift):
+                old = self._disturbance(before)
+                if old is not None and _side_lobe(new, old, drift):
+                    return True
+        return False
+
+    def _fitted(self, number: int) -> Disturbance:
+        """What fits a crest best, where the noise is as loud as there."""
+        profile, null = self.profile, self.null
+        height, low, high, beside, sign, snr = self._crests[number]
+        new = fit_cap(height, (low, high), sign, profile, self.noise, self.bank.drift, self.tip_radius, beside)
+        place = (new.place - profile.start) / profile.spacing
+        if null is not None:
+            new = new.at_scale(null.at(new.half_width, place))
+        elif self._sampled is not None:
+            level = seen(self._sampled, new.half_width / profile.spacing)
+            new = new.at_scale(float(np.interp(place, np.arange(len(level)), level)))
+        return replace(new, snr=snr) if not any(beside) and new.snr < snr else new
 
     @cached_property
-    def _measured(self) -> tuple[Disturbance, ...]:
-        """All above the threshold; measured when they are asked for, which costs most of a search."""
-        profile, bank, tip_radius, null = self.profile, self.bank, self.tip_radius, self.null
-        found: list[Disturbance] = []
-        sampled = sampling(profile, bank) if null is None and self.stretches else None
-        for height, begin, end, crest, snr in self.stretches:
-            for low, high in _crests(height, begin, end, crest, profile, self.noise, tip_radius):
-                beside = (low > begin, high < end)
-                sign = float(np.sign(crest))
-                new = fit_cap(height, (low, high), sign, profile, self.noise, bank.drift, tip_radius, beside)
-                place = (new.place - profile.start) / profile.spacing
-                if null is not None:
-                    new = new.at_scale(null.at(new.half_width, place))
-                elif sampled is not None:
-                    level = seen(sampled, new.half_width / profile.spacing)
-                    new = new.at_scale(float(np.interp(place, np.arange(len(level)), level)))
-                if not any(beside) and new.snr < snr:
-                    new = replace(new, snr=snr)
-                certain = abs(new.height) >= MEASURED * self.threshold * new.height_sd
-                if certain and new.snr >= self.threshold and not _side_lobe(new, found, bank.drift > 0):
-                    found.append(new)
-        return tuple(found)
+    def _crests(self) -> list[tuple[FloatArray, int, int, tuple[bool, bool], float, float]]:
+        """(heights, first bin, past-last bin, whether others are right before and behind, sign, signal-to-noise of the
+        stretch) of each crest of the stretches."""
+        return [
+            (height, low, high, (low > begin, high < end), float(np.sign(crest)), snr)
+            for height, begin, end, crest, snr in self.stretches
+            for low, high in _crests(height, begin, end, crest, self.profile, self.noise, self.tip_radius)
+        ]
+
+    @cached_property
+    def _sampled(self) -> FloatArray | None:
+        return sampling(self.profile, self.bank)
+
+    @cached_property
+    def _known(self) -> dict[int, Disturbance | None]:
+        return {}
 
 
 def search(
@@ -353,10 +395,12 @@ def _dug_by_noise(places: float) -> float:
     return float(-np.sqrt(2.0) * ndtri(DUG_BY_NOISE / (0.5 * places**2)))
 
 
-def _side_lobe(new: Disturbance, found: list[Disturbance], drift: bool) -> bool:
+def _side_lobe(new: Disturbance, old: Disturbance, drift: bool) -> bool:
     """True for what is left of a stronger disturbance whose shape is not quite a cap."""
-    for old in found:
-        reach = (old.stop - old.start) * (1.0 if drift else 0.6) + new.half_width
-        if abs(new.place - old.place) < reach and abs(new.height) < SIDE_LOBE * abs(old.height):
-            return True
-    return False
+    near = abs(new.place - old.place) < _reach(old.stop - old.start, new, drift)
+    return near and abs(new.height) < SIDE_LOBE * abs(old.height)
+
+
+def _reach(length: float, new: Disturbance, drift: bool) -> float:
+    """Distance up to which a disturbance so long has side lobes like a new one, m."""
+    return length * (1.0 if drift else 0.6) + new.half_width

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -129,6 +129,7 @@ def detect(
     stated: StatedNoise | None = None,
     begin: Noise | None = None,
     largest: float | None = None,
+    about: Mapping[int, FloatArray] | None = None,
 ) -> Detections:
     """Find every crossing of something that the base does not explain.
 
@@ -146,6 +147,8 @@ def detect(
         begin: of the samples, as whoever felt them measured it on a part of them: over a given mesh the search for the
             quiet path begins there in what is not stated, and nothing else follows from it.
         largest: half-width of the widest disturbance that counts as a fine feature, m; None: four tip radii.
+        about: by the number of each sweep the intervals of arclength (M, 2), m, that crossings are wanted of: what does
+            not meet them is looked for, but not measured, which takes most of the time; None: of all.
 
     Raises:
         DetectionError: an unknown algorithm, no samples, or a rate that is not positive.
@@ -163,7 +166,7 @@ def detect(
     laid = LaidTrace.of(trace, base)
     if noise is None and len(trace) <= RAW_SAMPLES:
         laid.feet()  # the noise is read from nearly all of them: whatever else is read follows from that
-    asked = _Asked(algorithm, false_alarms_per_metre, noise, stated, begin, largest)
+    asked = _Asked(algorithm, false_alarms_per_metre, noise, stated, begin, largest, about)
     return _detected(trace, laid, asked)
 
 
@@ -177,6 +180,11 @@ class _Asked:
     stated: StatedNoise | None
     begin: Noise | None
     largest: float | None
+    about: Mapping[int, FloatArray] | None
+
+    def of_sweep(self, number: int) -> FloatArray | None:
+        """(M, 2) intervals of arclength that crossings of a sweep are wanted of, m; None: all of it."""
+        return None if self.about is None else self.about.get(number, np.zeros((0, 2)))
 
 
 def _detected(trace: Trace, laid: LaidTrace, asked: _Asked, of_each: Noise | None = None) -> Detections:
@@ -258,14 +266,14 @@ def _detected(trace: Trace, laid: LaidTrace, asked: _Asked, of_each: Noise | Non
                 found_from = measured
     crossings = []
     for one, each in zip(over, found, strict=True):
-        disturbances = each.disturbances
+        disturbances = each.within(asked.of_sweep(each.profile.sweep))
         if base.kind == "profile":
             disturbances = tuple(d for d in disturbances if _stands_out(d, one.profile, level, tip))
         own = [c for d in disturbances for c in _crossings(d, one.profile, base, tip)]
         for edge in one.edges:
             own += [c for c in _crossings(edge.step(level, tip), edge.piece, base, tip) if c.kind in STEP_CROSSINGS]
         crossings += sorted(own, key=lambda c: c.t)
-    if narrow := sum(each.unfelt for each in found):
+    if narrow := sum(each.unfelt(asked.of_sweep(each.profile.sweep)) for each in found):
         left_out += (f"details that were not felt, for this ball draws nothing so narrow that is so high: {narrow}",)
     crossings, unresolved = _resolved(crossings, trace.resolution)
     left_out += unresolved

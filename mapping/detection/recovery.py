@@ -1,8 +1,9 @@
 """Recovery: crests of the detection limit are put into the quiet path of the log itself, and looked for again.
 
 What is promised of a detection is measured where it is promised: with this log's noise, path, sampling and base, all
-of the detection repeated (injection and recovery, as searches for gravitational waves state their sensitivity:
-Biswas, Brady, Creighton and Fairhurst, Classical and Quantum Gravity 26, 175009, 2009).
+of the detection repeated but for the sizes of what is found elsewhere (injection and recovery, as searches for
+gravitational waves state their sensitivity: Biswas, Brady, Creighton and Fairhurst, Classical and Quantum Gravity 26,
+175009, 2009).
 """
 
 from __future__ import annotations
@@ -55,9 +56,10 @@ def recovered(
             room = f"has room for {len(places)} of the {FEWEST_INJECTED} crests that this takes"
             short = f"the limit is computed, not measured: the quiet path {room}"
             return replace(detections, left_out=(*detections.left_out, short))
-        found = _count_found(
-            detect(_with_crests(laid, places, height), laid.base, **settings), laid, places, half_width
+        again = detect(
+            _with_crests(laid, places, height), laid.base, about=_about(laid, places, half_width), **settings
         )
+        found = _count_found(again, laid, places, half_width)
         injected = len(places)
         if found >= _fewest(injected, probability):
             break
@@ -122,6 +124,14 @@ def _with_crests(laid: LaidTrace, places: list[tuple[int, float]], height: float
         centers[begins[number] + low : begins[number] + high] += np.maximum(lift, 0.0)[:, None] * normals
     own = {each.name: getattr(laid, each.name) for each in fields(Trace) if each.init}
     return Trace(**(own | {"centers": centers}))
+
+
+def _about(laid: LaidTrace, places: list[tuple[int, float]], half_width: float) -> dict[int, FloatArray]:
+    """By the number of each sweep the intervals of arclength (M, 2), m, where the middle of a crest counts as found."""
+    about: dict[int, list[tuple[float, float]]] = {}
+    for number, place in places:
+        about.setdefault(laid.laid_sweeps[number].number, []).append((place - half_width, place + half_width))
+    return {sweep: np.array(intervals) for sweep, intervals in about.items()}
 
 
 def _count_found(found: Detections, laid: LaidTrace, places: list[tuple[int, float]], half_width: float) -> int:

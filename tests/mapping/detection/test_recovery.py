@@ -69,3 +69,18 @@ def test_a_sweep_too_short_to_be_looked_at_puts_the_limit_in_no_doubt() -> None:
     assert len(computed.left_out) == 1 and not computed.limit_in_doubt
     assert replace(computed, remarks=("the noise is not the same everywhere",)).limit_in_doubt
     assert replace(computed, left_out=(*computed.left_out, "9 samples were not felt and are left out")).limit_in_doubt
+
+
+def test_crossings_that_are_asked_about_are_those_of_all_that_lie_there() -> None:
+    trace = laid(np.ones(SWEEPS))
+    lift = sum(
+        np.maximum(height - (trace.laid_sweeps[0].arclength - place) ** 2 / (2 * TIP), 0.0)
+        for place, height in ((0.02, 1e-3), (0.035, 0.3e-3), (0.07, 0.5e-3))
+    )
+    centers = trace.centers + np.tile(lift, SWEEPS)[:, None] * [0.0, 0.0, 1.0]
+    bumpy = Trace(trace.t, centers, trace.sweep, TIP)
+    every = {(c.sweep, c.start, c.stop, c.height, c.snr) for c in detect(bumpy, PLATE).crossings}
+    about = {sweep: np.array([[0.069, 0.071]]) for sweep in range(1, SWEEPS)}
+    there = {(c.sweep, c.start, c.stop, c.height, c.snr) for c in detect(bumpy, PLATE, about=about).crossings}
+    assert there < every
+    assert {sweep for sweep, *_ in there} == set(about) and len(every) == 3 * SWEEPS
