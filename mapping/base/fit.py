@@ -213,7 +213,17 @@ def _noise_of(residual: FloatArray, cloud: Cloud) -> tuple[float, float]:
     """
     # the scatter from cell to cell is too large where sweeps are short and bend over features
     scale = max(0.5 * cloud.floor, robust_scale(residual))
-    return scale, min(_shares(residual, cloud.sweep, scale))
+    return scale, min(_independent(residual / scale), _shares(residual, cloud.sweep, scale)[1])
+
+
+def _independent(residual: FloatArray) -> float:
+    """The share of cells that count as independent by how alike those beside each other miss a fit, (C,) in its scale,
+    where that is noise: a detail is even from cell to cell, and where a quarter of the path lies on some, one sound
+    cell in seven would count."""
+    near = np.abs(residual) < FEATURE_RESIDUAL_SDS
+    square = max(float((residual[near] ** 2).sum()) / max(int(near.sum()), 1), 1e-12)
+    products = (residual[1:] * residual[:-1])[near[1:] & near[:-1]]
+    return independent_share(float(products.sum()) / max(len(products), 1) / square)
 
 
 def _shares(residual: FloatArray, sweep: IntArray, scale: float) -> tuple[float, float]:
