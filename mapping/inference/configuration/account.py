@@ -32,7 +32,14 @@ from mapping.inference.configuration.proposals import (
     dense,
     may_be_closed,
 )
-from mapping.inference.configuration.search import CROWDED, Account, searched
+from mapping.inference.configuration.search import (
+    CROWDED,
+    CROWDED_PARAMETERS,
+    MOST_WORK,
+    Account,
+    searched,
+    work_of,
+)
 from mapping.inference.configuration.told import in_words
 from mapping.inference.families import MEETING_REACH, PosteriorProblem, RidgeShape, Surroundings, TwinShape
 from mapping.inference.joint import OneOfMany, blocks_of, gaps
@@ -54,8 +61,9 @@ MOST_OF_A_SPOT = 0.5
 # Draws of the Gaussian that preliminary intervals are taken from
 PRELIMINARY_DRAWS = 400
 ENDED_EARLY = "the search for what is felt here, and what beside it, ended before all was tried"
-# What is said of more details than are weighed at once
-IN_BLOCKS = f"more details are felt together here than the {CROWDED} that are weighed at once: those beside were held"
+NOT_WEIGHED = "so many places tell of it that it was not asked what else it may be"
+# What is said of more details, or of more places that tell of some, than are weighed at once
+IN_BLOCKS = "more is felt together here than is weighed at once: the details beside were held"
 
 
 def accounted(
@@ -88,7 +96,7 @@ def accounted(
         blocks = [
             block
             for group, own in _groups([feature for block in known for feature in block.features], open_to, tip)
-            for block in _blocks(group, own, [origin[id(feature)] for feature in group], tip, again > 0)
+            for block in _blocks(group, own, [origin[id(feature)] for feature in group], places, tip, again > 0)
         ]
         for block in blocks:
             block.explained = all(known[k].explained for k in block.origins)
@@ -99,7 +107,7 @@ def accounted(
                 if block.laid and len(blocks) > 1:
                     block.felt = _described(block.laid[1], around)
         for block in weighed:
-            block.explained = block.laid is None or block.laid[1].fits
+            block.explained = block.understood and (block.laid is None or block.laid[1].fits)
         for block in weighed:
             _lay(block, _beside(block, blocks, tip, explained=True), places, around, false_alarms_per_metre)
             if block.laid is None:
@@ -123,6 +131,7 @@ class _Block:
         origins: the blocks that all of its neighbourhood was weighed in before.
         cut: True if it is not the whole of its neighbourhood.
         explained: True if what it holds leaves no more than noise, as far as that was asked.
+        understood: False if so many places tell of it that one fit would take what is there for all of them.
         felt: its features where they are likeliest by now, as they are held beside others.
         beside: what was held beside it when it was laid out; None: it was not yet.
         laid: its parts as the rules left them, and the same where they are likeliest; None if too few places tell of
@@ -134,6 +143,7 @@ class _Block:
     origins: frozenset[int]
     cut: bool = False
     explained: bool = True
+    understood: bool = True
     felt: list[Feature] = field(default_factory=list)
     beside: list[Feature] | None = None
     laid: tuple[list[Part], Configuration] | None = None
@@ -171,6 +181,11 @@ def _lay(
     if place is None:
         return
     place = _holding(beside, place)
+    details = len(block.features)
+    if work_of(CROWDED_PARAMETERS * details + len(place.held), len(place.window)) > MOST_WORK * max(details, 1):
+        block.features = [_noted(feature, (NOT_WEIGHED,)) for feature in block.features]
+        block.understood = False
+        return
     try:
         block.laid = _laid_out(block.features, place)
     except MappingError:  # a feature over whose axis the base does not go on has no family here
@@ -339,26 +354,37 @@ def _groups(
 
 
 def _blocks(
-    features: list[Feature], crossings: list[Crossing], origins: Sequence[int], tip: float, again: bool
+    features: list[Feature], crossings: list[Crossing], origins: Sequence[int], places: Places, tip: float, again: bool
 ) -> list[_Block]:
-    """A neighbourhood as one block, or cut into blocks of CROWDED details that lie nearest together.
+    """A neighbourhood as one block, or cut into blocks of details that lie nearest together: of CROWDED, or of fewer
+    where so many places tell of them that one fit took longer than that of such a crowd.
 
     Args:
         features, crossings: of the neighbourhood.
         origins: the blocks that the features were in before.
+        places: heights that all is weighed on.
         tip: radius, m.
         again: True if they were weighed in these. Blocks grow from where those met, so that what was cut is weighed
             together.
     """
-    if len(features) <= CROWDED:
-        return [_Block(features, crossings, frozenset(origins))]
     reach = np.array([sizes_of(feature, tip).half_width for feature in features])
+    told = [
+        distances(places.points, feature.axis) < NEIGHBOURHOOD_REACH * half
+        for feature, half in zip(features, reach.tolist(), strict=True)
+    ]
+
+    def too_many(block: Sequence[int]) -> bool:
+        of_block = np.logical_or.reduce([told[k] for k in block])
+        return len(block) > CROWDED or work_of(CROWDED_PARAMETERS * len(block), int(of_block.sum())) > 1.0
+
+    if len(features) < 2 or not too_many(range(len(features))):
+        return [_Block(features, crossings, frozenset(origins))]
     gap = gaps(features, list(reach))
     strength = np.array([feature.evidence.snr for feature in features])
     known = np.array(origins)
     met = again & ((gap < 0.0) & (known != known[:, None])).any(axis=1)
     order = [int(k) for k in np.lexsort((-strength, ~met))]
-    blocks = blocks_of(gap, order, CROWDED)
+    blocks = blocks_of(gap, order, too_many)
     of_block = {k: number for number, block in enumerate(blocks) for k in block}
     own: list[list[Crossing]] = [[] for _ in blocks]
     for crossing in crossings:

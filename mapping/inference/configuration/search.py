@@ -12,10 +12,11 @@ from mapping.inference.configuration.configuration import Configuration, Part, f
 from mapping.inference.configuration.neighbourhood import Neighbourhood
 from mapping.inference.configuration.proposals import JOIN, PROPOSALS, REMOVE, Parts, Proposal
 
-# Details that are weighed at once (see `account`), and places that they are usually weighed on: one fit of them takes
-# about one CPU second. Its time grows with the square of the details (rows of a difference quotient times shapes) and
-# with the places.
-CROWDED, CROWDED_PLACES = 10, 1000
+# Details that are weighed at once, each of so many parameters, and places that so many are weighed on (see `account`):
+# one fit of them takes one to two CPU seconds. Its time grows with the places, and with the parameters, each of which
+# is a row of a difference quotient, and what is held beside: 28 to 43 us for each row and place in fits of 1 to 10
+# details with 7 to 70 parameters on 1,100 to 20,500 places
+CROWDED, CROWDED_PARAMETERS, CROWDED_PLACES = 10, 6, 1000
 # Configurations that are fitted in one neighbourhood, of so many details each; of more, fewer: a bound on the time. The
 # benches' plates and the shipped scenes have 5 details at most: twice as many, for what is proposed beside them, are
 # not bounded any earlier.
@@ -23,10 +24,10 @@ MOST_FITTED = 40
 # So many fits a detail are tried where nothing improves them: of the blocks of a page of braille, searched without a
 # bound, those of two domes took 26, of three 41 and 42, of four 62
 FITS_OF_DETAIL = 16
-# Of such fits so many a detail are spent on joining pieces of a line, beyond them: 40 of 10 details, and 80 of 5, which
-# is every pair of them and every pair that is left after that. With both, less than 10 CPU s a detail: 2.9 where 39
-# details and 112 crossings felt each other, 6 in a row of twelve touching wires
-MOST_JOINED = 4.0
+# Work that is spent on each detail, in fits of a crowd: about half of the 10 CPU s that a feature may take, for each of
+# these takes 0.3 to 0.9 where most fits are given up early (1 to 5 details of a coin on 900 to 3,300 places). What does
+# not pay for itself is sought with as much again
+MOST_WORK = 6.0
 # Share of its cost that a fit takes which is given up as hopeless: 0.05 of 0.3 CPU s in the median of 48 about a groove
 GIVEN_UP_SHARE = 0.2
 # A proposal must be better by this log odds: less is rounding, or the same configuration found again
@@ -44,7 +45,7 @@ class Account:
         best: the configuration of the highest odds.
         visited: the best of each set of kinds, the best of all first.
         accepted: names of the proposals that led from the beginning to the best.
-        bounded: True if the search ended at MOST_FITTED or MOST_JOINED, with proposals left.
+        bounded: True if the search ended at MOST_FITTED or MOST_WORK, with proposals left.
     """
 
     start: Configuration
@@ -73,26 +74,27 @@ def searched(
         proposals: the generators that are asked, in order.
     """
     place, best, accepted, idle = start.place, start, list[str](), 0
-    left, bounded = MOST_FITTED - _cost(parts, place), False
+    spent, bounded = _Spent(len(parts)), False
+    spent.on(parts, place)
     visited = {start.kinds: start}
     if REMOVE in proposals:
         # what the others explain as well is no piece of anything; these trials cost less than any other
-        best, kept = _without_idle(start)
+        best, kept, bounded = _without_idle(start, spent)
         if best is not start:
             parts = [parts[k] for k in kept]
             visited[best.kinds] = best
             accepted.append(REMOVE.name)
-    whole, joining, joins = laid(parts, place), True, MOST_JOINED * len(parts)
+    whole, joining = laid(parts, place), True
     # pieces of one line hide each other once they are fitted: they are joined as the rules left them, those first that
     # gain most by it: both flanks of a wide line may be one step to some extent, and no longer a line after that
-    while joining and left > 0.0:
+    while joining and not spent.enough:
         joining = False
         for other_parts in _yielded(JOIN, whole, points) if JOIN in proposals else ():
-            if joins <= 0.0:
+            if spent.all_work:
                 bounded = True
                 break
             other = fitted(other_parts, place)
-            left, joins = left - _cost(other_parts, place), joins - _work(other_parts, place)
+            spent.on(other_parts, place)
             if other is not None and other.log_odds > best.log_odds + WORTH:
                 best, joined, joining = other, laid(other_parts, place), True
         if joining:
@@ -103,11 +105,12 @@ def searched(
         for proposal in proposals:
             found = best
             for proposed in _yielded(proposal, best, points):
-                if left <= 0.0 and proposal is not REMOVE:  # what does not pay for itself goes, however many there are
+                # what does not pay for itself goes, however many there are
+                if spent.enough if proposal is not REMOVE else spent.too_much:
                     bounded = True
                     break
                 other = fitted(proposed, best.place, best)
-                left -= _cost(proposed, best.place) * (GIVEN_UP_SHARE if other is None else 1.0)
+                spent.on(proposed, best.place, GIVEN_UP_SHARE if other is None else 1.0)
                 if other is None:
                     continue
                 known = visited.get(other.kinds)
@@ -126,28 +129,69 @@ def searched(
     return Account(start, order[0], tuple(likely), tuple(accepted), bounded)
 
 
-def _without_idle(start: Configuration) -> tuple[Configuration, list[int]]:
-    """The configuration without the parts that do not pay for themselves, the idlest first, and who is left."""
+@dataclass(eq=False)
+class _Spent:
+    """What a search has taken by now.
+
+    Args:
+        details: that it began with.
+        fits: configurations that were fitted, those of many details counting for more than one.
+        work: of fitting them, in fits of a crowd.
+    """
+
+    details: int
+    fits: float = 0.0
+    work: float = 0.0
+
+    def on(self, parts: Sequence[Part], place: Neighbourhood, share: float = 1.0) -> None:
+        """One more is fitted, or so much of it."""
+        own = _work(parts, place)
+        self.work += share * own
+        self.fits += share * max(min(1.0, MOST_FITTED / (FITS_OF_DETAIL * max(len(parts), 1))), own)
+
+    @property
+    def all_work(self) -> bool:
+        """True if the work that may be spent is."""
+        return self.work >= MOST_WORK * max(self.details, 1)
+
+    @property
+    def enough(self) -> bool:
+        """True if nothing more is proposed."""
+        return self.fits >= MOST_FITTED or self.all_work
+
+    @property
+    def too_much(self) -> bool:
+        """True if not even what does not pay for itself is sought."""
+        return self.work >= 2.0 * MOST_WORK * max(self.details, 1)
+
+
+def _work(parts: Sequence[Part], place: Neighbourhood) -> float:
+    """Of fitting a configuration, in fits of a crowd."""
+    return work_of(sum(len(part.start) for part in parts) + len(place.held), len(place.window))
+
+
+def work_of(rows: int, places: int) -> float:
+    """Of fitting what has so many parameters, or details held beside them, on so many places, in fits of a crowd."""
+    return rows * places / (CROWDED * CROWDED_PARAMETERS * CROWDED_PLACES)
+
+
+def _without_idle(start: Configuration, spent: _Spent) -> tuple[Configuration, list[int], bool]:
+    """The configuration without the parts that do not pay for themselves, the idlest first, who is left, and whether
+    that ended before all was tried."""
     best, kept = start, list(range(len(start.parts)))
-    while True:
-        trials = [fitted([*best.parts[:k], *best.parts[k + 1 :]], best.place, best) for k in range(len(best.parts))]
+    while not spent.all_work:
+        trials = list[Configuration | None]()
+        for k in range(len(best.parts)):
+            rest = [*best.parts[:k], *best.parts[k + 1 :]]
+            trials.append(fitted(rest, best.place, best))
+            spent.work += (GIVEN_UP_SHARE if trials[-1] is None else 1.0) * _work(rest, best.place)
         odds = [-np.inf if trial is None else trial.log_odds for trial in trials]
         idlest = int(np.argmax(odds)) if odds else 0
         other = trials[idlest] if odds else None
         if other is None or odds[idlest] <= best.log_odds + WORTH:
-            return best, kept
+            return best, kept, False
         best, kept = other, [*kept[:idlest], *kept[idlest + 1 :]]
-
-
-def _cost(parts: Sequence[Part], place: Neighbourhood) -> float:
-    """What fitting a configuration takes of MOST_FITTED: its work, or its share of the fits of so many details."""
-    return max(min(1.0, MOST_FITTED / (FITS_OF_DETAIL * max(len(parts), 1))), _work(parts, place))
-
-
-def _work(parts: Sequence[Part], place: Neighbourhood) -> float:
-    """Of fitting a configuration, in those of CROWDED details on CROWDED_PLACES."""
-    rows, shapes = len(parts) / CROWDED, (len(parts) + len(place.held)) / CROWDED
-    return rows * shapes * len(place.window) / CROWDED_PLACES
+    return best, kept, True
 
 
 def _yielded(proposal: Proposal, now: Configuration, points: FloatArray) -> Iterator[Parts]:

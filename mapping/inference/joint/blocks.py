@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -31,20 +31,20 @@ def felt_together(gap: FloatArray) -> list[list[int]]:
     return [[int(k) for k in np.flatnonzero(label == number)] for number in range(count)]
 
 
-def blocks_of(gap: FloatArray, order: Sequence[int], most: int) -> list[list[int]]:
+def blocks_of(gap: FloatArray, order: Sequence[int], too_many: Callable[[Sequence[int]], bool]) -> list[list[int]]:
     """Numbers cut into blocks: each grows from the first one left by whatever is nearest to it and touches it.
 
     Args:
         gap: (N, N) between what they disturb, m.
         order: of them, those first that blocks begin with.
-        most: numbers in a block.
+        too_many: True of numbers that are no block together.
     """
     left, blocks = list(order), list[list[int]]()
     while left:
         block = [left.pop(0)]
-        while left and len(block) < most:
+        while left:
             nearest = min(left, key=lambda k: float(gap[k, block].min()))
-            if gap[nearest, block].min() >= 0.0:
+            if gap[nearest, block].min() >= 0.0 or too_many([*block, nearest]):
                 break
             left.remove(nearest)
             block.append(nearest)

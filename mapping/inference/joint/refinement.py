@@ -124,7 +124,7 @@ def _groups(numbers: Sequence[int], features: Sequence[Feature], tip: float) -> 
         for feature, size in zip(wide, sizes, strict=True)
     ]
     gap = gaps(wide, reaches)
-    blocks = blocks_of(gap, range(len(features)), MOST_TOGETHER)
+    blocks = blocks_of(gap, range(len(features)), lambda block: len(block) > MOST_TOGETHER)
     return [sorted(numbers[k] for k in block) for block in blocks if len(block) > 1]
 
 

@@ -22,7 +22,7 @@ from mapping.assembly import assemble
 from mapping.base import Base, LaidTrace
 from mapping.detection import detect
 from mapping.inference.configuration import Places, in_words, numbers_in, share_as_told
-from mapping.inference.configuration.account import ENDED_EARLY, IN_BLOCKS, accounted
+from mapping.inference.configuration.account import ENDED_EARLY, IN_BLOCKS, NOT_WEIGHED, accounted
 from mapping.inference.configuration.configuration import (
     Configuration,
     Part,
@@ -157,6 +157,11 @@ def test_more_details_than_are_weighed_at_once_are_weighed_beside_each_other(mon
     # what is not tried is said
     monkeypatch.setattr(sys.modules[searched.__module__], "MOST_FITTED", 2)
     assert all(ENDED_EARLY in each.notes for each in assemble(detect(trace, base), trace, base, faint=False))
+    monkeypatch.undo()
+    monkeypatch.setattr(sys.modules[searched.__module__], "MOST_WORK", 1e-3)
+    assert all(ENDED_EARLY in each.notes for each in assemble(detect(trace, base), trace, base, faint=False))
+    monkeypatch.setattr(sys.modules[accounted.__module__], "MOST_WORK", 1e-3)
+    assert all(NOT_WEIGHED in each.notes for each in assemble(detect(trace, base), trace, base, faint=False))
 
 
 @pytest.mark.slow
