@@ -38,6 +38,7 @@ from mapping.inference.sampler import (
     laplace,
     resample,
     sample_ensemble,
+    steps_for,
     walkers_for,
 )
 from mapping.inference.summary import describe, described_at, with_ends_of_all
@@ -313,7 +314,8 @@ def solve_problem(
         return Solution(problem, _from_importance(problem, fast, rng), fast, None)
     walkers = walkers_for(len(problem.window), fast.draws.shape[1])
     starts = _starts(problem, fast, rng, walkers)
-    chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal)
+    steps = steps_for(len(problem.window), walkers)
+    chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal, max_steps=steps)
     return Solution(problem, _from_chain(problem, fast, chain, rng), fast, chain)
 
 

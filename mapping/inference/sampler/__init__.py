@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from mapping.inference.sampler.ensemble import (
         Chain as Chain,
         sample_ensemble as sample_ensemble,
+        steps_for as steps_for,
         walkers_for as walkers_for,
     )
     from mapping.inference.sampler.importance import (
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from mapping.inference.sampler.psis import resample as resample
 
 _PUBLIC = {
-    "ensemble": ("Chain", "sample_ensemble", "walkers_for"),
+    "ensemble": ("Chain", "sample_ensemble", "steps_for", "walkers_for"),
     "importance": ("Importance", "TRUSTED_K_HAT", "importance_sample"),
     "laplace": ("Laplace", "find_optima", "laplace", "linearised"),
     "proposal": ("root_of",),

@@ -16,6 +16,9 @@ from mapping.inference.sampler.proposal import DEGREES, Proposal
 # Walkers at least and at most; so many bins a step cost no more than what emcee does beside them, whoever sees them.
 WALKERS, MOST_WALKERS = 20, 48
 FREE_BINS = 12_000
+# Steps of a chain, at most, and values of all of its walkers: 50 to 80 ns each, so that it ends within 10 CPU s. Up to
+# 25,000 values a step, twice the free ones, the steps are the bound
+MOST_STEPS, MOST_VALUES = 6000, 150_000_000
 # Share of the steps that propose from an adapted proposal: where its tails are too light walkers stick, and the others
 # set them free.
 INDEPENDENT = 0.5
@@ -57,13 +60,18 @@ def walkers_for(bins: int, parameters: int) -> int:
     return max(min(max(FREE_BINS // bins, WALKERS), MOST_WALKERS), 2 * parameters + 4)
 
 
+def steps_for(bins: int, walkers: int) -> int:
+    """How many steps of so many walkers a chain over so many bins may take."""
+    return max(FIRST_LOOK, min(MOST_STEPS, MOST_VALUES // (bins * walkers)))
+
+
 def sample_ensemble(
     target: LogPosterior,
     starts: FloatArray,
     rng: np.random.Generator,
     *,
     proposal: Proposal | None = None,
-    max_steps: int = 6000,
+    max_steps: int = MOST_STEPS,
 ) -> Chain:
     """Draw from a target by an ensemble of walkers.
 

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from mapping.inference.sampler.ensemble import _autocorrelation, sample_ensemble
+from mapping.inference.sampler.ensemble import (
+    FIRST_LOOK,
+    MOST_STEPS,
+    MOST_VALUES,
+    _autocorrelation,
+    sample_ensemble,
+    steps_for,
+)
 from mapping.inference.sampler.importance import importance_sample
 from mapping.inference.sampler.laplace import Laplace
 
@@ -102,3 +109,9 @@ def test_two_modes_get_their_shares():
     chain = sample_ensemble(TwoModes(), fast.draws[:20], rng, proposal=fast.proposal)
     assert chain.status == "converged"
     assert (chain.samples[:, 0] > 6).mean() == pytest.approx(0.75, abs=0.06)
+
+
+def test_a_chain_over_many_bins_takes_fewer_steps() -> None:
+    assert steps_for(500, 24) == MOST_STEPS
+    assert FIRST_LOOK <= steps_for(3000, 20) < MOST_STEPS
+    assert steps_for(3000, 20) * 3000 * 20 <= MOST_VALUES
