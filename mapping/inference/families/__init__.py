@@ -17,11 +17,7 @@ if TYPE_CHECKING:
     from mapping.inference.families.broken_ridge import BrokenRidgeShape as BrokenRidgeShape
     from mapping.inference.families.bump import BumpShape as BumpShape, Spot as Spot, spot_at as spot_at
     from mapping.inference.families.free_tip import with_free_tip as with_free_tip, with_nominal_tip as with_nominal_tip
-    from mapping.inference.families.groove import (
-        Crossing as Crossing,
-        GrooveShape as GrooveShape,
-        OffsetRims as OffsetRims,
-    )
+    from mapping.inference.families.groove import Crossing as Crossing, GrooveShape as GrooveShape
     from mapping.inference.families.line_ends import tells_of_line as tells_of_line
     from mapping.inference.families.pit import PitShape as PitShape
     from mapping.inference.families.problem import (
@@ -45,7 +41,7 @@ if TYPE_CHECKING:
         smooth_pit_beside as smooth_pit_beside,
         smooth_section as smooth_section,
     )
-    from mapping.inference.families.step import StepShape as StepShape
+    from mapping.inference.families.step import OffsetRims as OffsetRims, StepShape as StepShape
     from mapping.inference.families.trapezoid import (
         ShoulderedShape as ShoulderedShape,
         TrapezoidShape as TrapezoidShape,
@@ -70,7 +66,7 @@ _PUBLIC = {
     "broken_ridge": ("BrokenRidgeShape",),
     "bump": ("BumpShape", "Spot", "spot_at"),
     "free_tip": ("with_free_tip", "with_nominal_tip"),
-    "groove": ("Crossing", "GrooveShape", "OffsetRims"),
+    "groove": ("Crossing", "GrooveShape"),
     "line_ends": ("tells_of_line",),
     "pit": ("PitShape",),
     "problem": (
@@ -94,7 +90,7 @@ _PUBLIC = {
         "smooth_pit_beside",
         "smooth_section",
     ),
-    "step": ("StepShape",),
+    "step": ("OffsetRims", "StepShape"),
     "trapezoid": (
         "ShoulderedShape",
         "TrapezoidShape",

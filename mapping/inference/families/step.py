@@ -1,10 +1,10 @@
-"""StepShape: an upright step along a curve on the base."""
+"""StepShape: an upright step along a curve on the base; and a groove along its edge."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
@@ -13,8 +13,31 @@ from mapping.inference.curves import Chart, CurveModes
 from mapping.inference.families.nodes import line_nodes
 from mapping.inference.likelihood import Prior, Window
 
-if TYPE_CHECKING:
-    from mapping.inference.families.groove import GrooveShape, OffsetRims
+
+class Upright(Protocol):
+    """What a step must know of a groove with upright walls that runs along its edge: see `GrooveShape`."""
+
+    @property
+    def window(self) -> Window: ...
+
+    @property
+    def chart(self) -> Chart: ...
+
+    @property
+    def modes(self) -> CurveModes: ...
+
+    @property
+    def tip_radius(self) -> float: ...
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    @property
+    def places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
+
+    def taken(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]: ...
+
+    def templates(self, theta: FloatArray) -> FloatArray: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +57,7 @@ class StepShape:
     priors: tuple[Prior, ...]
     start: FloatArray
     step: FloatArray
-    grooves: tuple[tuple[GrooveShape, FloatArray], ...] = ()
+    grooves: tuple[tuple[Upright, FloatArray], ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -57,8 +80,6 @@ class StepShape:
 
     @cached_property
     def _offset_rims(self) -> list[OffsetRims]:
-        from mapping.inference.families.groove import OffsetRims
-
         alone = replace(self, grooves=())
         return [OffsetRims(groove, alone) for groove, _ in self.grooves]
 
@@ -67,3 +88,80 @@ class StepShape:
         """(n, nodes) lateral distances from the chart, (2, m, n, nodes) modes and slopes, and bends of the base."""
         _, lateral, basis, bend, _ = line_nodes(self.window, self.chart, self.modes, self.tip_radius)
         return lateral, basis, bend
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetRims:
+    """An upright groove along the edge of a step, whose rims stand on two levels, as a gap between panels does.
+
+    Where the edge lies in the mouth, the rim on its high side stands that much higher; where it lies beyond the rim of
+    the low side's level, the ball in the groove may touch it. In both cases the ball rests on the highest of the groove
+    in the low level and of a step down into the groove, at the high rim or at the edge. Of a groove in the high level,
+    and of one that crosses the edge, heights add (theory section 4.4, equation 4.9b).
+
+    Args:
+        groove, edge: their families.
+        is_rim: True if the edge is a rim of the groove wherever it lies.
+    """
+
+    groove: Upright
+    edge: StepShape
+    is_rim: bool = False
+
+    def heights(self, theta: FloatArray, alone: FloatArray | None = None) -> FloatArray:
+        """(W, n) what both leave together more than the sum of what each leaves alone, m.
+
+        Args:
+            theta: (W, P) the groove's and the edge's parameters in a row.
+            alone: (W, n) what the groove leaves alone, m, if that is known.
+        """
+        from mapping.geometry.templates import step_heights
+
+        groove, edge = np.split(theta, [len(self.groove.names)], axis=1)
+        courses, ends, width, depth = self.groove.taken(groove)
+        uphill = np.zeros((len(width), 1)) if self.is_rim else self._uphill(courses, edge)
+        aside = uphill.mean(axis=1)
+        together = (np.ptp(uphill, axis=1) < width) & (aside > -0.5 * width)
+        out = np.zeros((len(groove), len(self.groove.window)))
+        if not together.any():
+            return out
+        moved = courses[together].copy()
+        moved[:, 0] += self._side * np.maximum(aside, 0.5 * width)[together]
+        deep, height = depth[together, None], edge[together, -1:]
+        wall = np.empty((len(moved), len(self.groove.window)))
+        _, lateral, basis, bend, _ = self.groove.places
+        step_heights(lateral, basis, bend, moved, (height + deep)[:, 0], self._side, self.groove.tip_radius, wall)
+        wall -= deep
+        alone = _templates(self.groove, groove[together]) if alone is None else alone[together]
+        s = self.groove.places[0].mean(axis=1)
+        within = (s > ends[together, :1]) & (s < ends[together, 1:])
+        added = alone + _templates(self.edge, edge[together])
+        out[together] = np.where(within, np.maximum(alone, wall) - added, 0.0)
+        return out
+
+    def _uphill(self, courses: FloatArray, edge: FloatArray) -> FloatArray:
+        """(W, K) how far uphill of the groove's middle the edge lies at places along it, m."""
+        along, s, aside, way = self._places
+        of_edge = self.edge.modes.lateral(edge[:, : self.edge.modes.count], along)
+        return np.asarray(self._side * (aside + way * of_edge - self.groove.modes.lateral(courses, s)))
+
+    @cached_property
+    def _side(self) -> float:
+        """+1 if the lateral side of the groove's chart is the step's high one, else -1."""
+        return float(self.edge.high_side * np.sign(np.sum(self._places[3])))
+
+    @cached_property
+    def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Where places on the edge's chart lie on it, on and beside the groove's chart, m, and which way (+1, -1) the
+        edge's lateral side is on that."""
+        chart, other = self.edge.chart, self.groove.chart
+        s, aside, leg = other.coordinates(chart.points)
+        along = (s >= other.s[0]) & (s <= other.s[-1])
+        along = along if along.any() else np.ones_like(along)
+        way = np.sign(np.einsum("ij,ij->i", chart.laterals, other.laterals[leg]))
+        return chart.s[along], s[along], aside[along], way[along]
+
+
+def _templates(shape: Upright | StepShape, theta: FloatArray) -> FloatArray:
+    """(W, n) heights, m; (1, n) where all parameters are the same, as of what is held."""
+    return shape.templates(theta[:1] if (theta == theta[0]).all() else theta)
