@@ -18,7 +18,7 @@ WALKERS, MOST_WALKERS = 20, 48
 FREE_BINS = 12_000
 # Steps of a chain, at most, and values of all of its walkers: 50 to 80 ns each, so that it ends within 10 CPU s. Up to
 # 25,000 values a step, twice the free ones, the steps are the bound
-MOST_STEPS, MOST_VALUES = 6000, 150_000_000
+LONGEST_CHAIN, MOST_CHAIN_VALUES = 6000, 150_000_000
 # Share of the steps that propose from an adapted proposal: where its tails are too light walkers stick, and the others
 # set them free.
 INDEPENDENT = 0.5
@@ -62,7 +62,7 @@ def walkers_for(bins: int, parameters: int) -> int:
 
 def steps_for(bins: int, walkers: int) -> int:
     """How many steps of so many walkers a chain over so many bins may take."""
-    return max(FIRST_LOOK, min(MOST_STEPS, MOST_VALUES // (bins * walkers)))
+    return max(FIRST_LOOK, min(LONGEST_CHAIN, MOST_CHAIN_VALUES // (bins * walkers)))
 
 
 def sample_ensemble(
@@ -71,7 +71,7 @@ def sample_ensemble(
     rng: np.random.Generator,
     *,
     proposal: Proposal | None = None,
-    max_steps: int = MOST_STEPS,
+    max_steps: int = LONGEST_CHAIN,
 ) -> Chain:
     """Draw from a target by an ensemble of walkers.
 

@@ -9,8 +9,8 @@ import pytest
 
 from mapping.inference.sampler.ensemble import (
     FIRST_LOOK,
-    MOST_STEPS,
-    MOST_VALUES,
+    LONGEST_CHAIN,
+    MOST_CHAIN_VALUES,
     _autocorrelation,
     sample_ensemble,
     steps_for,
@@ -112,6 +112,6 @@ def test_two_modes_get_their_shares():
 
 
 def test_a_chain_over_many_bins_takes_fewer_steps() -> None:
-    assert steps_for(500, 24) == MOST_STEPS
-    assert FIRST_LOOK <= steps_for(3000, 20) < MOST_STEPS
-    assert steps_for(3000, 20) * 3000 * 20 <= MOST_VALUES
+    assert steps_for(500, 24) == LONGEST_CHAIN
+    assert FIRST_LOOK <= steps_for(3000, 20) < LONGEST_CHAIN
+    assert steps_for(3000, 20) * 3000 * 20 <= MOST_CHAIN_VALUES
