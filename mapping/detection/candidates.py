@@ -243,7 +243,7 @@ def _stretches(
         accepted, changed = _dominant(candidates, weak), False
         if not accepted:
             return
-        for place, half_width, crest, snr, k in accepted:
+        for snr, place, half_width, crest, k in accepted:
             if changed and snr * bank.seen(height, place, k) / crest < threshold:
                 continue
             begin, end = _extent(height, place, half_width, crest, profile, noise, tip_radius)
@@ -282,28 +282,25 @@ def _longest(height: FloatArray, bank: Bank) -> float:
 
 def _candidates(
     height: FloatArray, bank: Bank, threshold: float, tip_radius: float, certainty: FloatArray | None
-) -> list[tuple[float, int, float, float, int]]:
-    """(signal-to-noise, bin, half-width in bins, height, filter) of local maxima over place for every width."""
+) -> FloatArray:
+    """(P, 5) signal-to-noise, bin, half-width in bins, height, and filter of local maxima over place for every width,
+    the strongest first."""
     sharpest = PHYSICAL / (2 * tip_radius)
-    found = bank.peaks(height, _longest(height, bank), threshold, sharpest, certainty).tolist()
-    widths = (bank.widths / bank.spacing).tolist()
-    return [(snr, int(place), widths[int(k)], crest, int(k)) for snr, place, k, crest in found]
+    snr, place, k, crest = bank.peaks(height, _longest(height, bank), threshold, sharpest, certainty).T
+    half_width = (bank.widths / bank.spacing)[k.astype(np.int64)]
+    found = np.column_stack([snr, place, half_width, crest, k])
+    return np.asarray(found[np.lexsort(found.T[::-1])[::-1]])
 
 
-def _dominant(
-    candidates: list[tuple[float, int, float, float, int]], taken: list[tuple[int, float]]
-) -> list[tuple[int, float, float, float, int]]:
-    """Place, half-width, height, signal-to-noise and filter of the candidates, the strongest first.
+def _dominant(candidates: FloatArray, taken: list[tuple[int, float]]) -> list[tuple[float, int, float, float, int]]:
+    """Signal-to-noise, bin, half-width in bins, height and filter of the candidates (P, 5), the strongest first.
 
-    Candidates that overlap a stronger one or one of those taken already (place, half-width) are left out.
+    Candidates that overlap a stronger one or one of those taken already (bin, half-width) are left out.
     """
-    kept: list[tuple[int, float, float, float, int]] = []
-    blocked = list(taken)
-    for snr, place, half_width, crest, k in sorted(candidates, reverse=True):
-        if all(abs(place - other) >= half_width + width for other, width in blocked):
-            kept.append((place, half_width, crest, snr, k))
-        blocked.append((place, half_width))
-    return kept
+    from mapping.detection.filters import dominant
+
+    kept = candidates[dominant(candidates[:, 1:3], np.array(taken, dtype=np.float64).reshape(-1, 2))]
+    return [(snr, int(place), half_width, crest, int(k)) for snr, place, half_width, crest, k in kept.tolist()]
 
 
 def _extent(

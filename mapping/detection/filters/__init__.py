@@ -10,6 +10,7 @@ if TYPE_CHECKING:
         false_alarms_over as false_alarms_over,
         threshold_for as threshold_for,
     )
+    from mapping.detection.filters.filter_kernels import dominant as dominant
     from mapping.detection.filters.matched_filter import (
         FILTER_BINS_PER_HALF_WIDTH as FILTER_BINS_PER_HALF_WIDTH,
         LADDER as LADDER,
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "cap_kernels": ("caps",),
     "false_alarms": ("false_alarms_over", "threshold_for"),
+    "filter_kernels": ("dominant",),
     "matched_filter": (
         "Bank",
         "FILTER_BINS_PER_HALF_WIDTH",

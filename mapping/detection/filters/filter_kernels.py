@@ -116,3 +116,21 @@ def _sum_of(values, first, count):  # type: ignore[no-untyped-def]
     for i in range(first + whole, first + count):
         total += values[i]
     return total
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def dominant(spans, taken):  # type: ignore[no-untyped-def]
+    """(P,) which spans (P, 2), middle and half-width, overlap none before them and none of those taken (T, 2)."""
+    kept = np.empty(len(spans), dtype=np.bool_)
+    for i in range(len(spans)):
+        kept[i] = not (_overlaps(spans[i], taken) or _overlaps(spans[i], spans[:i]))
+    return kept
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _overlaps(span, others):  # type: ignore[no-untyped-def]
+    found, j = False, 0
+    while j < len(others) and not found:
+        found = abs(span[0] - others[j, 0]) < span[1] + others[j, 1]
+        j += 1
+    return found
