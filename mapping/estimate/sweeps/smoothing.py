@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,7 +48,7 @@ class Smoothed:
     noise: Noise
     outward: FloatArray
 
-    @property
+    @cached_property
     def dented(self) -> BoolArray:
         """(M,) where the trace may hold a kink: within two smoothing lengths of dents beyond k_t = -1/r.
 
