@@ -42,6 +42,9 @@ WEIGHED_SAMPLE = 1000
 LOST_WEIGHT_SHARE = 0.1
 # Meshes above this size try only the neighbourhoods that a sample of their points chooses.
 LARGE_MESH_POINTS = 20_000
+# Noise over the body's size that takes no less of the digits than squares do. A fit by moments errs by rounding times
+# the condition of R, 1e5 at most, in units of the heights: by 2e-5 of what this noise does.
+LEAST_NOISE = 1e-6
 # Neighbours held at once by one thread: 8 MB
 CHUNK_VALUES = 1_000_000
 SMOOTHING = 24
@@ -174,13 +177,16 @@ class _Jets:
         self.normals = _smoothed_normals(place, rough, self.tree, alike)
         self.bends = np.zeros(len(place))
 
-    def fit(self, chosen: IntArray, sizes: IntArray, near: IntArray | None = None) -> _Candidates:
-        """Every candidate at the chosen points; `near` as of the method, if it is known."""
+    def fit(self, chosen: IntArray, sizes: IntArray, noise: float, near: IntArray | None = None) -> _Candidates:
+        """Every candidate at the chosen points, in no more digits than the noise (0: unknown) leaves; `near` as of the
+        method, if it is known."""
         from mapping.geometry.curvature.jet_kernels import fit_jets
 
         near = self.near(chosen, int(sizes[-1])) if near is None else near
-        bends = self.bends[chosen]
-        return _Candidates(*fit_jets(self.place, self.normals, near, chosen, bends, self.alike, sizes, self.degree))
+        bends, noisy = self.bends[chosen], noise > LEAST_NOISE
+        return _Candidates(
+            *fit_jets(self.place, self.normals, near, chosen, bends, self.alike, sizes, self.degree, noisy)
+        )
 
     def near(self, chosen: IntArray, count: int) -> IntArray:
         """(M, count) nearest points, nearest first; N where there are no more."""
@@ -196,7 +202,7 @@ class _Jets:
         Noise leaves the same residual in both; what the polynomial cannot follow grows with the power of the radius
         that is one above its degree. The median ignores the few points where the surface is not smooth.
         """
-        rests = self.fit(self.sample(), np.array(SMALL)).rests[..., -1]
+        rests = self.fit(self.sample(), np.array(SMALL), 0.0).rests[..., -1]
         rests = rests[np.isfinite(rests).all(axis=1)]
         if len(rests) == 0:
             return 0.0
@@ -225,7 +231,7 @@ class _Jets:
         from scipy.spatial import cKDTree
 
         sample = self.sample(count)
-        found, tree = self.fit(sample, sizes), cKDTree(self.place[sample])
+        found, tree = self.fit(sample, sizes, noise), cKDTree(self.place[sample])
         pools = tree.query(self.place[sample], k=min(POOL, len(sample)))[1].reshape(len(sample), 1, -1)
         every, own = np.arange(len(sample)), found.deviations(noise)
         weights = self._weights(found, own, every, pools, sizes)
@@ -247,7 +253,7 @@ class _Jets:
     def worthwhile(self, sizes: IntArray, noise: float) -> IntArray:
         """The sizes that points of a sample give most weight to, with those that judge them."""
         sample = self.sample(WEIGHED_SAMPLE)
-        found = self.fit(sample, sizes)
+        found = self.fit(sample, sizes, noise)
         own, all_of_it = found.deviations(noise), np.arange(len(sample))
         weights = self._weights(found, own, all_of_it, all_of_it[:, None, None], sizes).sum(axis=2)
         reach = np.cumsum(weights[np.isfinite(weights).all(axis=1)].mean(axis=0))
@@ -265,7 +271,7 @@ class _Jets:
 
         def fill(part: IntArray) -> None:
             near = self.near(part, max(int(sizes[-1]), POOL_REACHES[0]))
-            found = self.fit(part, sizes, near)
+            found = self.fit(part, sizes, noise, near)
             every.operators[part], every.factors[part] = found.operators, found.factors
             every.rests[part], every.slopes[part] = found.rests, found.slopes
             for k, reach in enumerate(POOL_REACHES):

@@ -17,6 +17,11 @@ CERTAIN_GAP = 12.5
 
 # Numbers of 8 bytes that one instruction of 32 bytes takes at once: new rows are filled up with zeros to a multiple
 FILLED_UP_TO = 4
+# Monomials up to degree 12, the products of two of degree 6
+PRODUCTS = 91
+# Of each row of normal equations: where the heights and the columns of the identity stand, and its length, a multiple
+# of what one instruction takes
+HEIGHTS_AT, IDENTITY_AT, EQUATION = 28, 29, 40
 # Sizes apart of two fits that judge each other's bias: about twice as many points
 JUDGE_STEPS = 2
 LEAST_SQUARED_ERROR = 1e-28  # squared error of a curvature that is never undercut, for bodies of about unit size
@@ -160,15 +165,8 @@ def _determined(triangle, columns, ratio):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _solve(triangle, columns, heights, inverse, coefficients, factors):  # type: ignore[no-untyped-def]
-    """Coefficients (D, 6) up to second degree of all nested fits of at most so many columns, and the variance factors
-    (D,) of their curvatures (squared Frobenius norms).
-
-    Six rows of the inverse of R tell all of them: what is summed over fewer columns is the fit of these alone.
-    `heights` is the row of the heights, `inverse` room for (columns, 6).
-    """
-    s0, s1, s2, s3, s4, s5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    a, b, c, option = 0.0, 0.0, 0.0, 0
+def _invert(triangle, columns, inverse):  # type: ignore[no-untyped-def]
+    """The first six rows of the inverse of R, of which row j of the triangle holds column j, as (columns, 6)."""
     for j in range(columns):
         r0, r1, r2 = 1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0
         r3, r4, r5 = 1.0 if j == 3 else 0.0, 1.0 if j == 4 else 0.0, 1.0 if j == 5 else 0.0
@@ -180,11 +178,25 @@ def _solve(triangle, columns, heights, inverse, coefficients, factors):  # type:
             r3 -= share * inverse[k, 3]
             r4 -= share * inverse[k, 4]
             r5 -= share * inverse[k, 5]
-        own, height = 1.0 / triangle[j, j], triangle[heights, j]
-        r0, r1, r2, r3, r4, r5 = r0 * own, r1 * own, r2 * own, r3 * own, r4 * own, r5 * own
-        inverse[j, 0], inverse[j, 1], inverse[j, 2] = r0, r1, r2
-        inverse[j, 3], inverse[j, 4], inverse[j, 5] = r3, r4, r5
-        s0, s1, s2 = s0 + height * r0, s1 + height * r1, s2 + height * r2
+        own = 1.0 / triangle[j, j]
+        inverse[j, 0], inverse[j, 1], inverse[j, 2] = r0 * own, r1 * own, r2 * own
+        inverse[j, 3], inverse[j, 4], inverse[j, 5] = r3 * own, r4 * own, r5 * own
+
+
+@njit(cache=True)
+def _nested(inverse, heights, columns, coefficients, factors):  # type: ignore[no-untyped-def]
+    """Coefficients (D, 6) up to second degree of all nested fits of at most so many columns, and the variance factors
+    (D,) of their curvatures (squared Frobenius norms).
+
+    Six rows of the inverse of R and the rotated heights tell all of them: what is summed over fewer columns is the fit
+    of these alone.
+    """
+    s0, s1, s2, s3, s4, s5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    a, b, c, option = 0.0, 0.0, 0.0, 0
+    for j in range(columns):
+        height = heights[j]
+        r3, r4, r5 = inverse[j, 3], inverse[j, 4], inverse[j, 5]
+        s0, s1, s2 = s0 + height * inverse[j, 0], s1 + height * inverse[j, 1], s2 + height * inverse[j, 2]
         s3, s4, s5 = s3 + height * r3, s4 + height * r4, s5 + height * r5
         a, b, c = a + r3 * r3, b + r4 * r4, c + r5 * r5
         if j + 1 == TERMS_OF_DEGREE[option]:
@@ -192,6 +204,117 @@ def _solve(triangle, columns, heights, inverse, coefficients, factors):  # type:
             coefficients[option, 3], coefficients[option, 4], coefficients[option, 5] = s3, s4, s5
             factors[option] = 4.0 * a + 2.0 * b + 4.0 * c
             option += 1
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _add_moments(place, first, last, scale, degree, room, moments, heights):  # type: ignore[no-untyped-def]
+    """Add points first to last to the sums of all monomials up to twice the degree, and of those up to the degree times
+    the height, both in the order of the columns; the points' sum of squared heights. `room` is of (5, K + 4)."""
+    points = last - first
+    count = -(-points // FILLED_UP_TO) * FILLED_UP_TO
+    u, v, z, power, term = room[0], room[1], room[2], room[3], room[4]
+    for i in range(points):
+        u[i], v[i] = place[0, first + i] / scale, place[1, first + i] / scale
+        z[i], power[i] = place[2, first + i] / scale, 1.0
+    for i in range(points, count):
+        u[i], v[i], z[i], power[i] = 0.0, 0.0, 0.0, 0.0
+    square = 0.0
+    for i in range(count):
+        square += z[i] * z[i]
+    for q in range(2 * degree + 1):
+        for i in range(count):
+            term[i] = power[i]
+        _add_powers(u, term, count, q, 2 * degree, moments)
+        if q <= degree:
+            for i in range(count):
+                term[i] = power[i] * z[i]
+            _add_powers(u, term, count, q, degree, heights)
+        for i in range(count):
+            power[i] *= v[i]
+    return square
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _add_powers(u, term, count, q, degree, sums):  # type: ignore[no-untyped-def]
+    """Add the sums of term, term u, term u^2 ..., of which the first is of degree q in v, four in one pass."""
+    d = q
+    while d <= degree:
+        s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+        for i in range(count):
+            t, x = term[i], u[i]
+            s0 += t
+            t *= x
+            s1 += t
+            t *= x
+            s2 += t
+            t *= x
+            s3 += t
+            term[i] = t * x
+        sums[d * (d + 1) // 2 + q] += s0
+        if d + 1 <= degree:
+            sums[(d + 1) * (d + 2) // 2 + q] += s1
+        if d + 2 <= degree:
+            sums[(d + 2) * (d + 3) // 2 + q] += s2
+        if d + 3 <= degree:
+            sums[(d + 3) * (d + 4) // 2 + q] += s3
+        d += 4
+
+
+@njit(cache=True)
+def _normal_equations(moments, heights, columns, rows):  # type: ignore[no-untyped-def]
+    """Write the products of the columns, on and right of the diagonal, beside them those with the heights, and the
+    identity's first six columns. The product of two monomials is one of the moments."""
+    j, d = 0, 0
+    while j < columns:
+        for q in range(d + 1):
+            for c in range(EQUATION):
+                rows[j, c] = 0.0
+            c, other = d * (d + 1) // 2, d
+            while c < columns:
+                start = (d + other) * (d + other + 1) // 2 + q
+                for i in range(other + 1):
+                    rows[j, c + i] = moments[start + i]
+                c += other + 1
+                other += 1
+            rows[j, HEIGHTS_AT] = heights[j]
+            if j < 6:
+                rows[j, IDENTITY_AT + j] = 1.0
+            j += 1
+        d += 1
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _cholesky(rows, columns):  # type: ignore[no-untyped-def]
+    """Make R of the products of the columns, beside it the rotated heights and the first six rows of its inverse, each
+    as a column. It ends with a zero on the diagonal where a column depends on those before it.
+
+    Two rows at a time, so that what is read serves both.
+    """
+    for j in range(0, columns, 2):
+        one, other = rows[j], rows[j + 1]
+        for k in range(0, j, 2):
+            a, b, c, d = rows[k, j], rows[k + 1, j], rows[k, j + 1], rows[k + 1, j + 1]
+            for i in range(EQUATION):
+                x, y = rows[k, i], rows[k + 1, i]
+                one[i] -= a * x + b * y
+                other[i] -= c * x + d * y
+        if not one[j] > 0.0:
+            one[j] = 0.0
+            return
+        a = 1.0 / np.sqrt(one[j])
+        for i in range(EQUATION):
+            one[i] *= a
+        if j + 1 == columns:
+            return
+        c = one[j + 1]
+        for i in range(EQUATION):
+            other[i] -= c * one[i]
+        if not other[j + 1] > 0.0:
+            other[j + 1] = 0.0
+            return
+        a = 1.0 / np.sqrt(other[j + 1])
+        for i in range(EQUATION):
+            other[i] *= a
 
 
 @njit(cache=True)
@@ -266,11 +389,13 @@ def _reach(place, first, last, reach):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree):  # type: ignore[no-untyped-def]
+def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree, by_moments):  # type: ignore[no-untyped-def]
     """Shape operators of chosen points by every neighbourhood size and every even degree up to the given one.
 
-    The sizes are nested: each adds its new points to the triangle of the one before, and one triangle serves all
-    degrees, so that all candidates together cost one fit over the largest neighbourhood.
+    The sizes are nested: each adds its new points to what is known of the one before, and one triangle serves all
+    degrees, so that all candidates together cost little more than one fit over the largest neighbourhood. What is known
+    is the triangle itself, which reflections keep exact; or the moments, in half the time: the products of columns
+    that are monomials are few monomials of twice the degree. Squares keep half of the digits, which noise may not need.
 
     The ordinate of the fits is z + k z^2 / 2, which is quadratic on a sphere or cylinder of curvature k, however much
     of it the neighbourhood holds: a polynomial of z over the tangent plane would have to follow a square root.
@@ -283,6 +408,7 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
         alike: cosine of the angle by which the normals of one side turn at most.
         sizes: (S,) neighbourhood sizes, ascending, at most K.
         degree: 2, 4 or 6.
+        by_moments: False to keep all digits.
 
     Returns:
         (M, S, D, 3) operators, NaN where undetermined; (M, S, D) standard deviations per unit of noise (Frobenius);
@@ -294,10 +420,12 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
     rests = np.full((count, len(sizes), options), np.nan)
     slopes = np.zeros((count, len(sizes), options, 2))
     widest, columns = neighbours.shape[1], TERMS_OF_DEGREE[options - 1]
-    place = np.empty((3, widest))
+    place, room = np.empty((3, widest)), np.empty((5, widest + FILLED_UP_TO))
     rows = np.empty((MONOMIALS + 1, widest + FILLED_UP_TO))
     triangle = np.empty((MONOMIALS + 1, MONOMIALS))
-    coefficients, inverse, variances = np.zeros((options, 6)), np.zeros((MONOMIALS, 6)), np.zeros(options)
+    heights, inverse = np.zeros(MONOMIALS), np.zeros((MONOMIALS, 6))
+    moments, products, equations = np.empty(PRODUCTS), np.empty(MONOMIALS), np.zeros((MONOMIALS, EQUATION))
+    coefficients, variances = np.zeros((options, 6)), np.zeros(options)
     ends = np.zeros(len(sizes), dtype=np.int64)
     for m in range(count):
         e1, e2 = _frame(normals[chosen[m]])
@@ -305,28 +433,47 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
         scale = np.sqrt(_reach(place, 0, used, 0.0))
         if scale == 0.0:
             continue
-        triangle[:] = 0.0
+        triangle[:], moments[:], products[:] = 0.0, 0.0, 0.0
         rest, first, reach = 0.0, 0, 0.0
         for s in range(len(sizes)):
             last = ends[s]
             if last == first:
                 continue
             reach = _reach(place, first, last, reach)
-            filled = _design(place[0], place[1], place[2], first, last, scale, degree, rows)
-            rest += _absorb(triangle, rows, filled, columns)
-            first, over, before, known = last, rest, columns, False
-            for d in range(options - 1, -1, -1):
+            if by_moments:
+                rest += _add_moments(place, first, last, scale, degree, room, moments, products)
+            else:
+                filled = _design(place[0], place[1], place[2], first, last, scale, degree, rows)
+                rest += _absorb(triangle, rows, filled, columns)
+            first, most = last, options
+            while most > 0 and last < TERMS_OF_DEGREE[most - 1] + SPARE_POINTS[most - 1]:
+                most -= 1
+            if most == 0 or reach == 0.0:
+                continue
+            if by_moments:
+                _normal_equations(moments, products, TERMS_OF_DEGREE[most - 1], equations)
+                _cholesky(equations, TERMS_OF_DEGREE[most - 1])
+            known = equations if by_moments else triangle
+            while most > 0 and not _determined(known, TERMS_OF_DEGREE[most - 1], scale / np.sqrt(reach)):
+                most -= 1
+            if most == 0:
+                continue
+            terms, over = TERMS_OF_DEGREE[most - 1], rest
+            if by_moments:
+                for j in range(terms):
+                    heights[j], inverse[j] = equations[j, HEIGHTS_AT], equations[j, IDENTITY_AT : IDENTITY_AT + 6]
+                    over -= heights[j] ** 2
+                over = max(over, 0.0)
+            else:
+                _invert(triangle, terms, inverse)
+                heights[:columns] = triangle[columns, :columns]
+                for j in range(terms, columns):
+                    over += heights[j] ** 2
+            _nested(inverse, heights, terms, coefficients, variances)
+            for d in range(most - 1, -1, -1):
+                for j in range(TERMS_OF_DEGREE[d], terms):
+                    over += heights[j] ** 2
                 terms = TERMS_OF_DEGREE[d]
-                for j in range(terms, before):
-                    over += triangle[columns, j] ** 2
-                before = terms
-                if last < terms + SPARE_POINTS[d] or reach == 0.0:
-                    continue
-                if not _determined(triangle, terms, scale / np.sqrt(reach)):
-                    continue
-                if not known:
-                    _solve(triangle, terms, columns, inverse, coefficients, variances)
-                    known = True
                 factors[m, s, d] = np.sqrt(variances[d]) / (scale * scale)
                 _weingarten(coefficients[d], scale, bends[m] * scale, operators[m, s, d])
                 slopes[m, s, d] = coefficients[d, 1:3]
@@ -354,8 +501,9 @@ def pooled_bias(operators, deviations, pools, reaches, sizes, certainty, out):  
         out: (M, S, D) squared Frobenius norms, written.
     """
     options, pool, levels = operators.shape[2], pools.shape[2], pools.shape[1]
-    # of the pool's points side by side: variances, NaN where undetermined, and operators
-    variances, parts = np.empty((len(sizes), options, pool)), np.empty((len(sizes), options, 3, pool))
+    # of the pool's points side by side: variances, NaN where undetermined and where a row is filled up, and operators
+    row = -(-pool // (2 * FILLED_UP_TO)) * 2 * FILLED_UP_TO
+    variances, parts = np.full((len(sizes), options, row), np.nan), np.zeros((len(sizes), options, 3, row))
     for m in range(len(pools)):
         level = -1
         for s in range(len(sizes)):
