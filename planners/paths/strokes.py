@@ -80,7 +80,8 @@ class Strokes:
             here, normal, ahead = track[-1]
             near = self.base.nearest.query(here + step * ahead)
             onward = tangential(carried(ahead, normal, near.normals), near.normals)
-            onward = turned(onward, near.normals, turn * step)
+            if turn:
+                onward = turned(onward, near.normals, turn * step)
             stuck = np.linalg.norm(near.points - here, axis=1) < 0.3 * step
             stuck &= (normal * near.normals).sum(axis=1) > 0.999
             going.append(going[-1] & ~stuck)
@@ -149,13 +150,21 @@ def tangential(direction: FloatArray, normal: FloatArray) -> FloatArray:
 
 def carried(direction: FloatArray, old: FloatArray, new: FloatArray) -> FloatArray:
     """Directions (..., 3) rotated by the smallest rotation that takes one unit normal to the other."""
-    axis = np.cross(old, new)
+    axis = _cross(old, new)
     cosine = (old * new).sum(axis=-1, keepdims=True)
-    once = np.cross(axis, direction)
-    rotated = direction + once + np.cross(axis, once) / np.maximum(1.0 + cosine, 1e-3)
+    once = _cross(axis, direction)
+    rotated = direction + once + _cross(axis, once) / np.maximum(1.0 + cosine, 1e-3)
     return np.asarray(np.where(cosine < -0.999, direction, rotated))
 
 
 def turned(direction: FloatArray, normal: FloatArray, angle: ArrayLike) -> FloatArray:
     """Tangent directions (..., 3) turned about the normals by an angle, rad."""
-    return np.asarray(np.cos(angle) * direction + np.sin(angle) * np.cross(normal, direction))
+    return np.asarray(np.cos(angle) * direction + np.sin(angle) * _cross(normal, direction))
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Vector products of (..., 3) of one shape: numpy's own, at a third of the time that it takes for a single one."""
+    out = np.empty_like(a)
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        out[..., k] = a[..., i] * b[..., j] - a[..., j] * b[..., i]
+    return out
