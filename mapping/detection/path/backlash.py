@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -297,7 +298,7 @@ class _Profile:
 
     def _beside(self, taken: Lag | None) -> FloatArray:
         """(n,) heights beside all crests, with all of the play, m."""
-        raw = self.heights.height - self._caps(self.crests)
+        raw = self.heights.height - self._own_caps
         if taken is not None:
             raw = raw + np.einsum("ij,ij->i", taken.at(self.heights.t), self.normals)
         return raw
@@ -317,8 +318,9 @@ class _Profile:
 
     def _caps(self, crests: FloatArray) -> FloatArray:
         """(n,) heights of crests (K, 3), m."""
-        height, place, half_width = crests.T[:, :, None]
-        return np.asarray((height * np.maximum(1.0 - ((self.s - place) / half_width) ** 2, 0.0)).sum(axis=0))
+        from mapping.detection.path.backlash_kernels import heights_of_caps
+
+        return np.asarray(heights_of_caps(self.s, crests))
 
     def behind(self, half: float, crests: FloatArray) -> FloatArray:
         """(n, 3) by how much axes with half a play are off where the ball runs over such crests (K, 3), m."""
@@ -329,8 +331,14 @@ class _Profile:
 
     def _shape(self, half: float, crests: FloatArray) -> FloatArray:
         """(n,) what of the heights is not the crests that were found, with half a play and such crests (K, 3), m."""
-        lowered = np.einsum("ij,ij->i", self.behind(half, crests), self.normals)
-        return np.asarray(lowered + self._caps(crests) - self._caps(self.crests))
+        from mapping.detection.path.backlash_kernels import lowered_by
+
+        caps = self._caps(crests)
+        return np.asarray(lowered_by(self._level, self.normals, caps, half) + caps - self._own_caps)
+
+    @cached_property
+    def _own_caps(self) -> FloatArray:
+        return self._caps(self.crests)
 
     def fitted(self, half: float, crests: FloatArray) -> FloatArray:
         """(K, 3) the crests that fit best beside half a play, from such ones on: what the play does to the heights
@@ -367,7 +375,7 @@ class _Profile:
         root = _whitening(self.heights, TURN_BINS, merge, noise)
         free = np.linalg.qr(root @ np.column_stack([np.ones(TURN_BINS), np.arange(float(TURN_BINS))]))[0]
         root -= free @ (free.T @ root)
-        path, raw = self._level + self._caps(self.crests)[:, None] * self.normals, self._beside(taken)
+        path, raw = self._level + self._own_caps[:, None] * self.normals, self._beside(taken)
         left = [raw - np.einsum("ij,ij->i", hang_behind(path, half), self.normals) for half in halves]
         means = np.array(left)[:, bins].reshape(len(halves), -1, TURN_BINS, merge).mean(axis=3)
         return np.asarray(((means @ root.T) ** 2).sum(axis=2).T)

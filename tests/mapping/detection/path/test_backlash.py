@@ -11,6 +11,7 @@ from mapping import FloatArray, Surface, Trace
 from mapping.base import Base, LaidTrace
 from mapping.detection import Detections, detect
 from mapping.detection.path import Backlash, Lag, backlash, with_doubt, without_backlash
+from mapping.detection.path.backlash_kernels import hang_behind, heights_of_caps, lowered_by
 
 TIP, STEP, NOISE, SWEEPS = 5e-3, 50e-6, 20e-6, 12
 HEIGHTS = np.array([0.12e-3, 0.2e-3, 0.16e-3])
@@ -154,3 +155,16 @@ def test_few_crossings_leave_a_play_in_doubt_that_is_told_once_it_is_taken_off(s
     on_trial, seen, _ = asked(without_backlash(trace, first))
     again = backlash(on_trial, seen, first)
     assert again is not None and again.gain > first.gain
+
+
+def test_what_a_play_takes_off_is_what_the_axes_of_the_path_over_the_caps_hang_behind():
+    rng = np.random.default_rng(2)
+    s, crests = np.linspace(0.0, 0.02, 300), np.array([[4e-4, 0.006, 0.002], [-2e-4, 0.013, 0.004]])
+    normals = rng.standard_normal((300, 3))
+    level = np.cumsum(1e-5 * rng.standard_normal((300, 3)), axis=0)
+    caps = heights_of_caps(s, crests)
+    height, place, half = crests.T[:, :, None]
+    np.testing.assert_array_equal(caps, (height * np.maximum(1.0 - ((s - place) / half) ** 2, 0.0)).sum(axis=0))
+    behind = hang_behind(level + caps[:, None] * normals, 3e-5)
+    np.testing.assert_allclose(lowered_by(level, normals, caps, 3e-5), (behind * normals).sum(axis=1), atol=1e-18)
+    assert np.abs(behind).max() == 3e-5
