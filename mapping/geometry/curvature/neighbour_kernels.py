@@ -28,7 +28,8 @@ def nearest_points(points, order, boxes, places, out):  # type: ignore[no-untype
         out: (M, K) their numbers, written; N where there are no more.
     """
     total, count = len(points), min(out.shape[1], len(points))
-    squares, found = np.empty(total), np.empty(total, np.int64)
+    # one more: each point is written where the next found one belongs
+    squares, found, shelf = np.empty(total + 1), np.empty(total + 1, np.int64), np.empty(total, np.int64)
     near, numbers = np.empty(total), np.empty(total, np.int64)
     ends, waiting = np.empty(count + 1, np.int64), np.empty(MOST_WAITING, np.int64)
     size = 0.0
@@ -54,13 +55,14 @@ def nearest_points(points, order, boxes, places, out):  # type: ignore[no-untype
             wider = reach * (ROOMIER * count / number if number > 0 else 4.0)
             reach = wider if number < count and wider < high else max(0.5 * (low + high), LEAST_SQUARE)
         # shelves of equal area, which hold about one each, and then their few in order
-        ends[:] = 0
+        ends[:], shelves_to_one = 0, count / reach
         for i in range(number):
-            ends[_shelf(squares[i], reach, count) + 1] += 1
+            shelf[i] = min(int(squares[i] * shelves_to_one), count - 1)
+            ends[shelf[i] + 1] += 1
         for k in range(count):
             ends[k + 1] += ends[k]
         for i in range(number):
-            k = _shelf(squares[i], reach, count)
+            k = shelf[i]
             near[ends[k]], numbers[ends[k]] = squares[i], found[i]
             ends[k] += 1
         k = 0
@@ -77,11 +79,6 @@ def nearest_points(points, order, boxes, places, out):  # type: ignore[no-untype
         for i in range(count, out.shape[1]):
             out[m, i] = total
         reach = ROOMIER * near[count - 1] if near[count - 1] > LEAST_SQUARE else start
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _shelf(square, reach, count):  # type: ignore[no-untyped-def]
-    return min(int(square / reach * count), count - 1)
 
 
 @njit(cache=True, error_model="numpy")
@@ -107,7 +104,6 @@ def _within(points, order, boxes, x, y, z, reach, most, waiting, squares, found)
         start = (box - leaves) * POINTS_PER_BOX
         for i in range(start, min(start + POINTS_PER_BOX, len(points))):
             square = (points[i, 0] - x) ** 2 + (points[i, 1] - y) ** 2 + (points[i, 2] - z) ** 2
-            if square <= reach:
-                squares[number], found[number] = square, order[i]
-                number += 1
+            squares[number], found[number] = square, order[i]
+            number += 1 if square <= reach else 0
     return number
