@@ -49,7 +49,9 @@ class Surface:
     @cached_property
     def bounds(self) -> FloatArray:
         """(2, 3) smallest and largest coordinates of the referenced vertices, m."""
-        used = self.vertices[self.faces.ravel()]
+        referenced = np.zeros(len(self.vertices), dtype=bool)
+        referenced[self.faces] = True
+        used = self.vertices[referenced]
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
     @cached_property

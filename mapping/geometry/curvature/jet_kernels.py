@@ -512,10 +512,10 @@ def pooled_bias(operators, deviations, pools, reaches, sizes, certainty, out):  
                 last = s  # of the sizes that are judged by this pool
                 while last + 1 < len(sizes) and (level + 1 == levels or sizes[last + 1] < reaches[level + 1]):
                     last += 1
-                for size in range(min(last + 2, len(sizes))):
-                    for d in range(options):
-                        for i in range(pool):
-                            y = pools[m, level, i]
+                for i in range(pool):
+                    y = pools[m, level, i]
+                    for size in range(min(last + 2, len(sizes))):
+                        for d in range(options):
                             sd = deviations[y, size, d]
                             variances[size, d, i] = sd * sd if np.isfinite(sd) else np.nan
                             for k in range(3):
