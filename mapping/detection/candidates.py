@@ -299,7 +299,9 @@ def _dominant(candidates: FloatArray, taken: list[tuple[int, float]]) -> list[tu
     """
     from mapping.detection.filters import dominant
 
-    kept = candidates[dominant(candidates[:, 1:3], np.array(taken, dtype=np.float64).reshape(-1, 2))]
+    # one layout whatever their number, and so one compiled kernel
+    spans = np.ascontiguousarray(candidates[:, 1:3])
+    kept = candidates[dominant(spans, np.array(taken, dtype=np.float64).reshape(-1, 2))]
     return [(snr, int(place), half_width, crest, int(k)) for snr, place, half_width, crest, k in kept.tolist()]
 
 
