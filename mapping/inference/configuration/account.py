@@ -23,7 +23,6 @@ from mapping.inference.configuration.neighbourhood import (
     thin_half_width,
 )
 from mapping.inference.configuration.proposals import (
-    PEAK_SDS,
     PROPOSALS,
     Proposal,
     apart_of,
@@ -31,6 +30,7 @@ from mapping.inference.configuration.proposals import (
     as_point,
     dense,
     may_be_closed,
+    may_be_points,
 )
 from mapping.inference.configuration.search import (
     CROWDED,
@@ -100,7 +100,9 @@ def accounted(
         ]
         for block in blocks:
             block.explained = all(known[k].explained for k in block.origins)
-        weighed = [block for block in blocks if not again or len(block.origins) > 1]
+        # what was left behind by something that is weighed elsewhere now is another number than was told with it
+        met = {k for block in blocks if len(block.origins) > 1 for k in block.origins}
+        weighed = [block for block in blocks if not again or met & block.origins]
         for _ in range(LAID_ROUNDS):
             for block in weighed:
                 _lay(block, _beside(block, blocks, tip), places, around, false_alarms_per_metre)
@@ -220,7 +222,7 @@ def _improved(
     """The features of one block, as they are or better, and the configuration of the highest odds."""
     group = block.features
     if _is_plain(start):
-        return _bent_as_fitted(group, start, around), start
+        return [_with_odds(feature, (), ()) for feature in _bent_as_fitted(group, start, around)], start
     points = [c.point for c in block.crossings if c.kind == "convex"]
     points += [
         point for feature in group if kind_of(feature).line and kind_of(feature).sign > 0 for point in feature.axis
@@ -307,11 +309,11 @@ def _holding(beside: Sequence[Feature], place: Neighbourhood) -> Neighbourhood:
 
 
 def _is_plain(start: Configuration) -> bool:
-    """True of at most one detail that has no wide section to choose, is not closed perhaps, and over which nothing
-    stands out."""
+    """True of at most one detail that has no wide section to choose, is not closed perhaps, and leaves nothing that
+    the least misfit does not explain: of what was felt of two details as of one line little stands out."""
     wide = any(isinstance(part.shape, RidgeShape) for part in start.parts) and not all(start.as_narrow_as_wires)
-    returns = any(may_be_closed(part) for part in start.parts)
-    return len(start.parts) < 2 and not wide and not returns and not bool((np.abs(start.standing_off) > PEAK_SDS).any())
+    returns = any(may_be_closed(part) or may_be_points(part, start.place) for part in start.parts)
+    return len(start.parts) < 2 and not wide and not returns and start.is_explained
 
 
 def _weighed(feature: Feature) -> bool:

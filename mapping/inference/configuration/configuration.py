@@ -39,6 +39,9 @@ FITTING_EXCESS = 3.0
 WIDE_SDS = 2.0
 # Signal-to-noise ratio of the gap of two lines that are two: of one in 40 flat tops noise makes as much of a gap
 SINKS_SDS = 2.0
+# Standard deviations by which a place must stand off a configuration to be looked at; how wrong one is, is then asked
+# of the evidence
+PEAK_SDS = 4.0
 # Half-width of the crests that a residual is searched with, in that of the narrowest detail: where one is hidden in
 # another's disturbance only a part of it stands out
 SHARPEST = 0.7
@@ -146,6 +149,14 @@ class Configuration:
         """(n,) heights that it leaves, m."""
         return np.asarray(self.shape.templates(self.found.mean[None])[0])
 
+    @cached_property
+    def crests(self) -> FloatArray:
+        """(n,) heights of its crests over the ground that they stand on, m."""
+        crests = [part for part in self.parts if stands_out(part.shape)]
+        theta = np.concatenate([np.zeros(0), *(part.start for part in crests)])
+        joined = JoinedShape([part.shape for part in crests], len(self.place.window), PARTS_OF_BIN)
+        return np.asarray(joined.templates(theta[None])[0])
+
     def runs(self, k: int) -> int:
         """How many runs of a sweep felt the k-th part at half its height or more."""
         part, window = self.parts[k], self.place.window
@@ -159,6 +170,11 @@ class Configuration:
         return (float(white @ white) - self.deviation.explained - len(white)) / float(
             np.sqrt(2.0 * len(white))
         ) < FITTING_EXCESS
+
+    @property
+    def is_explained(self) -> bool:
+        """True if the least misfit is likeliest, and nothing stands off it."""
+        return self.level == 0 and not bool((np.abs(self.standing_off) > PEAK_SDS).any())
 
     @cached_property
     def white_residual(self) -> FloatArray:
@@ -187,6 +203,11 @@ class Configuration:
         for start, stop in zip(window.starts[:-1], window.starts[1:], strict=True):
             over[start:stop] -= np.median(over[start:stop])
         return np.asarray(over)
+
+    @property
+    def felt(self) -> FloatArray:
+        """(n,) heights without what the base may do under each run, m."""
+        return self.template + self.residual
 
     @cached_property
     def standing_off(self) -> FloatArray:

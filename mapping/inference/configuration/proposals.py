@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from mapping import BoolArray, Feature, FloatArray, Interval, MappingError, Support
-from mapping.geometry.mesh import arclengths, distances, nearest_on
+from mapping.geometry.mesh import arclengths, distances, middle, nearest_on
 from mapping.inference.configuration.configuration import (
+    PEAK_SDS,
     Configuration,
     Part,
     about,
@@ -29,6 +30,7 @@ from mapping.inference.configuration.neighbourhood import NEIGHBOURHOOD_REACH, N
 from mapping.inference.curves import HIGHEST_DEGREE, ends_on_face
 from mapping.inference.families import (
     BellRidgeShape,
+    BellShape,
     BumpShape,
     GrooveShape,
     RidgeShape,
@@ -63,9 +65,6 @@ POINTS_OF_LEG = 65
 EXTENDED = 0.3
 # Points that two lines are drawn through, at least
 FEWEST_POINTS = 4
-# Standard deviations by which a place must stand off a configuration to be looked at; how wrong one is, is then asked
-# of the evidence
-PEAK_SDS = 4.0
 # Logarithm by which the radius of a crest exceeds a wire's where the thin one is asked as well: the prior's scale
 THINNER = 1.0
 # Degrees that a line's course is asked to have instead of a higher one. Each is half of the next, up to the highest: a
@@ -260,7 +259,8 @@ def between(now: Configuration) -> Iterator[Parts]:
 
 
 def apart(now: Configuration) -> Iterator[Parts]:
-    """A twin as two lines that need not be alike, and a point as two."""
+    """A twin as two lines that need not be alike, a point as two, and a line that is short, or leaves something over,
+    as points where it ends."""
     for k, part in enumerate(now.parts):
         if isinstance(part.shape, TwinShape):
             yield [*now.parts[:k], *apart_of(part), *now.parts[k + 1 :]]
@@ -272,6 +272,57 @@ def apart(now: Configuration) -> Iterator[Parts]:
                 ]
                 rest = [*now.parts[:k], *now.parts[k + 1 :]]
                 yield [*rest, *(part_of(_plainly(each), now.place) for each in two)]
+        elif _is_crest(part) and (may_be_points(part, now.place) or not now.is_explained):
+            own = np.maximum(now.felt, 0.0)
+            points = [_felt_about(now, end, own, part.feature) for end in axis_of(part)[[0, -1]]]
+            yield [*now.parts[:k], *points, *now.parts[k + 1 :]]
+
+
+def _is_crest(part: Part) -> bool:
+    """True of an open line that stands out."""
+    kind = kind_of(part.feature)
+    return kind.line and kind.has_ends and kind.sign > 0 and not part.feature.closed
+
+
+def may_be_points(part: Part, place: Neighbourhood) -> bool:
+    """True of an open line that stands out and is no longer than two points beside each other are felt."""
+    half = sizes_of(part.feature, place.around.trace.tip_radius).half_width
+    return _is_crest(part) and float(arclengths(axis_of(part))[-1]) < 2.0 * AS_WIDE * half
+
+
+def moved(now: Configuration) -> Iterator[Parts]:
+    """A point that stands out where rows feel it together: from a place on a row no slope leads to between two."""
+    for k, part in enumerate(now.parts):
+        kind = kind_of(part.feature)
+        if not kind.line and kind.sign > 0 and not now.is_explained:
+            others = replace(now, parts=(*now.parts[:k], *now.parts[k + 1 :])).crests
+            spot = _felt_about(now, axis_of(part)[0], np.maximum(now.felt - others, 0.0), part.feature)
+            yield [*now.parts[:k], spot, *now.parts[k + 1 :]]
+
+
+def _felt_about(now: Configuration, place: FloatArray, own: FloatArray, like: Feature) -> Part:
+    """The point that stands out where rows feel something together about a place (3,).
+
+    Rows that feel one lie less than twice its half-width apart, and each of them is as much lower as it passes beside
+    it.
+
+    Args:
+        now: what is known.
+        place: where it was felt.
+        own: (n,) heights that it leaves beyond what is known, m.
+        like: a feature as high as it was felt there.
+    """
+    feet, tip = now.place.window.feet, now.place.around.trace.tip_radius
+    reach = 2.0 * sizes_of(like, tip).half_width
+    near = np.linalg.norm(feet - place, axis=1) < reach
+    if (own[near] > 0.0).any():
+        place = feet[near][int(np.argmax(own[near]))]
+        near = np.linalg.norm(feet - place, axis=1) < reach
+    weight = own[near] ** 2 / max(float((own[near] ** 2).sum()), np.finfo(float).tiny)
+    middle = place + weight @ (feet[near] - place)
+    height = float(weight @ (now.felt[near] + ((feet[near] - middle) ** 2).sum(axis=1) / (2.0 * tip)))
+    spot = _sized(like, kind_made_of("convex", line=False).name, height, height)
+    return part_of(_plainly(replace(spot, axis=middle[None], normals=like.normals[:1])), now.place)
 
 
 def other_kinds(now: Configuration) -> Iterator[Parts]:
@@ -326,15 +377,20 @@ def ringed(now: Configuration, points: FloatArray) -> Iterator[Parts]:
 
 
 def as_point(line: Feature, tip_radius: float) -> Feature | None:
-    """The point that may be meant instead of a line which is hardly longer than wide; None of others."""
+    """The point that may be meant instead of a line which is hardly longer than wide; None of others.
+
+    Of one that stands out the ball is as high at both ends of the line as the line is.
+    """
     kind = kind_of(line)
-    half = sizes_of(line, tip_radius).half_width
-    if not kind.line or kind.sided or not kind.made_of or float(arclengths(line.axis)[-1]) >= AS_WIDE * half:
+    half, length = sizes_of(line, tip_radius).half_width, float(arclengths(line.axis)[-1])
+    if not kind.line or kind.sided or not kind.made_of or length >= AS_WIDE * half:
         return None
-    middle, point = len(line.axis) // 2, kind_made_of(kind.made_of, line=False)
-    normal = line.normals[min(middle, len(line.normals) - 1)]
-    nowhere = Interval(0.0, 0.0, 0.0)
-    return _plainly(replace(line, kind=point.name, axis=line.axis[[middle]], normals=normal[None], length=nowhere))
+    if kind.sign > 0:
+        line = replace(line, height=about(line.height.median + length**2 / (8.0 * tip_radius)))
+    point, at, nowhere = kind_made_of(kind.made_of, line=False), middle(line.axis)[0], Interval(0.0, 0.0, 0.0)
+    nearest = int(np.argmin(np.linalg.norm(line.axis - at, axis=1)))
+    normal = line.normals[min(nearest, len(line.normals) - 1)]
+    return _plainly(replace(line, kind=point.name, axis=at[None], normals=normal[None], length=nowhere))
 
 
 def straight(now: Configuration, points: FloatArray) -> Iterator[Parts]:
@@ -409,13 +465,17 @@ def more(now: Configuration) -> Iterator[Parts]:
     A crest that was fitted alone is as wide as what lies beside it made it: it is asked as a thin one, too.
     """
     yield from _more(now)
-    thin = [_thin(part) for part in now.parts]
+    thin = [_thin(part, now.place) for part in now.parts]
     if any(one is not other for one, other in zip(thin, now.parts, strict=True)):
         yield from _more(laid(thin, now.place))
 
 
-def _thin(part: Part) -> Part:
-    """A round crest with the section of a wire of its height; others as they are."""
+def _thin(part: Part, place: Neighbourhood) -> Part:
+    """A crest that is round or runs out with the section of a wire of its height; others as they are."""
+    if isinstance(part.shape, BellShape | BellRidgeShape):
+        height = max(float(part.start[-3]), np.finfo(float).tiny)
+        wire = _sized(part.feature, part.feature.kind, height, height)
+        return _line(wire, axis_of(part), place, HIGHEST_DEGREE)
     if not isinstance(part.shape, RidgeShape | BumpShape):
         return part
     start = part.start.copy()
@@ -424,7 +484,10 @@ def _thin(part: Part) -> Part:
 
 
 def _more(now: Configuration) -> Iterator[Parts]:
-    """The same for one configuration."""
+    """The same for one configuration.
+
+    The highest of crests is felt: what stands off one is as high as it is felt there, not as it stands off.
+    """
     window, tip = now.place.window, now.place.around.trace.tip_radius
     for sign in (1.0, -1.0):
         over, peak = sign * now.residual, _peaks(now, sign)
@@ -433,7 +496,8 @@ def _more(now: Configuration) -> Iterator[Parts]:
         places, heights = window.feet[peak], over[peak]
         top = int(np.argmax(heights))
         high = heights > 0.3 * heights[top]
-        model = _model(now.place, places[top], window.normals[peak][top], sign * float(np.median(heights[high])))
+        felt = heights + now.crests[peak] if sign > 0 else heights
+        model = _model(now.place, places[top], window.normals[peak][top], sign * float(np.median(felt[high])))
         half = float(np.sqrt(2.0 * tip * abs(model.height.median)))
         spot = kind_made_of("convex" if sign > 0 else "concave", line=False)
         found = straight_lines(places[high], max(ON_LINE * half, 1.5 * float(window.half.max())))
@@ -508,6 +572,7 @@ PROPOSALS = (
     Proposal("ring", ringed),
     JOIN,
     Proposal("apart", lambda now, points: apart(now)),
+    Proposal("move", lambda now, points: moved(now)),
     Proposal("between", lambda now, points: between(now)),
     Proposal("kind", lambda now, points: other_kinds(now)),
     Proposal("extend", lambda now, points: extended(now)),

@@ -33,7 +33,7 @@ from mapping.inference.configuration.configuration import (
     part_of,
 )
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood, window_of
-from mapping.inference.configuration.proposals import chained, joined, smoother, straight_lines
+from mapping.inference.configuration.proposals import as_point, chained, joined, smoother, straight_lines
 from mapping.inference.configuration.search import searched
 from mapping.inference.families import Crossing, SmoothGrooveShape, Surroundings
 from mapping.inference.joint import JoinedShape
@@ -313,6 +313,37 @@ def test_details_that_hide_each_other_are_counted() -> None:
     # a wire of 0.34 mm with another beside it, 0.21 mm high, that the rules took for one wide one
     case = run_counts(FIRST_BUILT_WITH + 57)
     assert case.true == 3 and case.stated[3] > 0.9
+
+
+@pytest.mark.parametrize(
+    ("seed", "true"),
+    [
+        (21, 5),  # a bump of 0.45 mm at the end of a wire of 0.18 mm: added as high as it stood off, it lay beneath
+        (24, 3),  # two bumps that three rows feel as one line
+    ],
+)
+def test_details_beside_others_are_counted(seed: int, true: int) -> None:
+    case = run_counts(FIRST_BUILT_WITH + seed)
+    assert case.true == true and case.stated[true] > 0.9
+
+
+def test_a_bump_between_two_rows_is_told_where_it_is() -> None:
+    # the higher of two bumps 8.6 mm apart lay on a row, where no slope leads off it, and a low ridge told the rest
+    case = run_counts(FIRST_BUILT_WITH + 1014)
+    assert case.true == 2 and case.stated[2] > 0.9
+
+
+def test_a_line_that_may_be_a_point_is_one_half_way_along_it() -> None:
+    tip, height, half = 10e-3, 0.15e-3, 1e-3
+    size, up = Interval(height, height, height), np.tile([0.0, 0.0, 1.0], (2, 1))
+    axis = np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
+    line = Feature("ridge", axis, up, size, size, Interval(2.0 * half, 0.0, 1.0), Support(9.0, 9), True, 1e-4)
+    point = as_point(line, tip)
+    assert point is not None and point.kind == "bump"
+    np.testing.assert_allclose(point.axis, [[0.0, 0.0, 0.0]])
+    # as high as the line where the line ends
+    assert point.height.median - half**2 / (2.0 * tip) == pytest.approx(height)
+    assert as_point(replace(line, axis=3.0 * axis), tip) is None
 
 
 def test_a_low_bump_beside_a_high_one_is_counted() -> None:
