@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -29,7 +28,7 @@ from mapping.inference.families import (
     twin_beside,
 )
 from mapping.inference.joint import JoinedShape, stands_out
-from mapping.inference.kinds import KINDS, LineKind, PointKind, kind_named, kind_of, sizes_of
+from mapping.inference.kinds import LineKind, PointKind, kind_of, sizes_of
 from mapping.inference.likelihood import LogPosterior, Shape
 from mapping.inference.sampler import Laplace, find_optima, laplace
 
@@ -49,8 +48,6 @@ SHARPEST = 0.7
 SCREENED, HOPELESS = 8, 40.0
 # Half-widths within which the priors of the kinds leave a place open
 PLACE_OPEN = 1.5
-# Kinds of details that have a posterior
-OF_ANY_KIND = sum(kind_named(name).sampled for name in KINDS)
 # Lower is no height, m: its inverse squared is still a number
 NO_HEIGHT = 1e-12
 # The level of misfit is chosen again where the optimum under the first one says another
@@ -184,7 +181,7 @@ class Configuration:
     @property
     def log_prior(self) -> float:
         """Log odds of its details before the data."""
-        return _log_prior_of(self.parts, self.place)
+        return sum(_log_prior(part, self.place) for part in self.parts)
 
     @cached_property
     def as_narrow_as_wires(self) -> list[bool]:
@@ -367,7 +364,7 @@ def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | N
         deviation = common_deviation(details, target, PARTS_OF_BIN, place.around.trace.tip_radius)
         evidence = found.log_evidence + deviation.log_factor
     plain = sum(_plain(part, found.covariance[own, own]) for part, own in zip(moved, shape.columns, strict=True))
-    prior = _log_prior_of(moved, place)
+    prior = sum(_log_prior(part, place) for part in parts)
     odds = evidence + float(constants[level]) - float(np.log(len(constants))) + plain + prior
     whole = Configuration(moved, place, found, level, float(odds), deviation)
     return whole if whole.gaps_are_felt else None
@@ -388,21 +385,8 @@ def _is_hollow(part: Part) -> bool:
     return not stands_out(part.shape) and not isinstance(part.shape, StepShape)
 
 
-def _log_prior_of(parts: Sequence[Part], place: Neighbourhood) -> float:
-    """Log odds of some details together before the data: a detail beside a detail is not as rare as one alone.
-
-    The first costs what a false one does. That another is beside it has a probability of which nothing is known, and so
-    has each further one: n are there with that of 1 / (n (n + 1)) (Laplace's rule of succession). Each further one lies
-    anywhere on the path of the neighbourhood, is of any kind, and may be counted in any order.
-    """
-    count = max(len(parts), 1)
-    anywhere = OF_ANY_KIND * place.false_alarms_per_metre * 2.0 * float(place.window.half.sum())
-    numbers = math.lgamma(count) - math.log(0.5 * (count + 1))
-    return sum(_log_prior(part, place) for part in parts) - (count - 1) * math.log(anywhere) + numbers
-
-
 def _log_prior(part: Part, place: Neighbourhood) -> float:
-    """Log odds of a lone detail before the data: as many false ones are accepted on the path where it may lie.
+    """Log odds of one detail more before the data: as many false ones are accepted on the path where it may lie.
 
     Its place is left open within PLACE_OPEN half-widths of where it was proposed. What is proposed wherever the
     residual is highest pays thereby for all the places that it might have been proposed at.

@@ -346,24 +346,6 @@ def test_a_line_that_may_be_a_point_is_one_half_way_along_it() -> None:
     assert as_point(replace(line, axis=3.0 * axis), tip) is None
 
 
-def test_a_low_bump_beside_a_high_one_is_counted() -> None:
-    case = run_counts(FIRST_BUILT_WITH + 44)  # 0.2 mm and 0.58 mm high
-    assert case.true == 2 and case.stated[2] > 0.9
-
-
-def test_a_detail_beside_a_detail_is_not_as_rare_as_one_alone() -> None:
-    body = "wires 2 mm apart"
-    features = [_true(true) for true in classified_body(body, FIRST_BUILT_WITH).truth]
-    place = _weighed_on(body, features)
-    parts = [part_of(feature, place, 1) for feature in features]
-    one, two = (laid(some, place).log_prior for some in (parts[:1], parts))
-    assert one < 0.0 and two - one > 0.5 * one
-    # the more there are the less one more costs
-    priors = [laid(parts[:1] * count, place).log_prior for count in range(6)]
-    costs = -np.diff(priors)
-    assert costs[0] == pytest.approx(-one) and (np.diff(costs) < 0.0).all()
-
-
 def test_where_the_trace_hardly_decides_both_counts_are_stated() -> None:
     seed = FIRST_BUILT_WITH + 1
     scene = classified_body("wires 2 mm apart", seed)
