@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapping import FloatArray
+from mapping import CourseError, FloatArray
 
 # Two half circles that meet in an S lie off their best polynomials by 4.7 % of their radius at degree 8, by 0.9 % at
 # 16; a course takes a degree only where it pays for itself
@@ -30,6 +30,9 @@ def smooth_axis(axis: FloatArray, sd: float, most: int = HIGHEST_DEGREE, least: 
 
     Returns:
         The smoothed polyline and its degree; the axis itself and the highest degree if none fits.
+
+    Raises:
+        CourseError: all crossings are in one place, or one is nowhere.
     """
     closed = len(axis) > 3 and bool(np.array_equal(axis[0], axis[-1]))
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(axis, axis=0), axis=1))])
@@ -39,6 +42,8 @@ def smooth_axis(axis: FloatArray, sd: float, most: int = HIGHEST_DEGREE, least: 
     lowest = min(least, most)
     if most < 1:
         return axis, 1
+    if not 0.0 < s[-1] < np.inf:
+        raise CourseError(f"a course needs crossings in two places; found {len(axis)} in one, or one that is nowhere")
     x = s / s[-1] * 2.0 - 1.0
     dense = np.linspace(-1.0, 1.0, max(2, 4 * len(axis), 65 if closed else 2))
     best, best_cost, best_misfit = lowest, np.inf, np.inf
