@@ -25,9 +25,9 @@ ASKED_FOR_NORMAL = 500
 OTHER_PASS = 2.0
 # Cosine of the least angle to the path at which a line to a neighbour tells the normal
 HALF_RIGHT = float(np.sqrt(0.5))
-# Facets of a height field's mesh along both axes at least, and of each piece of its spline: where this is as bent as
-# the ball, which it is at most, they lie within 0.01 radii of it (pieces of 2.5 radii: 2.5 / 12 squared over 8 is
-# 0.005)
+# Facets of a height field's mesh along both axes at least: over a quarter of a circle they lie (pi / 2 / 96)^2 / 8, or
+# 3e-5, of its radius off it. And of each piece of a spline, as of eight of the former: where it is as bent as the ball,
+# which it is at most, they lie within 0.01 radii of it (pieces of 2.5 radii: 2.5 / 12 squared over 8 is 0.005)
 FEWEST_FACETS, FACETS_OF_PIECE = 96, 12
 # Coefficients of a sheet: a bound on the time, which grows with their cube (300 take 0.8 CPU s). Pieces are longer
 # where more would be needed, down to so many along an axis, of which both axes together fit the bound
@@ -310,9 +310,10 @@ def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
     """A bicubic spline sheet; its pieces are no shorter than so many tip radii, nor than the rows tell apart, and no
     more than MOST_COEFFICIENTS and the cells can tell."""
     low, high = cloud.extent
-    ideal, most = (high[:2] - low[:2]) / (shortest * cloud.tip_radius), min(MOST_COEFFICIENTS, len(cloud.points) // 4)
+    # each coefficient takes four cells
+    ideal, room = (high[:2] - low[:2]) / (shortest * cloud.tip_radius), min(MOST_COEFFICIENTS, len(cloud.points) // 4)
     # as long along both axes; 1.05: none is longer by more than that than it must be
-    while np.prod(ideal.astype(int) + 3) > most and ideal.max() > FEWEST_PIECES + 1:
+    while np.prod(ideal.astype(int) + 3) > room and ideal.max() > FEWEST_PIECES + 1:
         ideal = ideal / 1.05
     pieces = [int(n) for n in ideal]
     pieces = [

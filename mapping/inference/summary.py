@@ -11,8 +11,8 @@ import numpy as np
 from mapping import Feature, FloatArray, Interval, Posterior
 from mapping.base import Base, onto_base
 from mapping.inference.curves import Chart, ends_on_face
-from mapping.inference.families import PosteriorProblem, with_nominal_tip
-from mapping.inference.kinds import LineShape, PointShape, kind_of
+from mapping.inference.families import LineShape, PosteriorProblem, with_nominal_tip
+from mapping.inference.kinds import PointShape, kind_of
 
 # Draws that lengths of curves are measured on, and points of the reported axis.
 FEW_DRAWS = 400

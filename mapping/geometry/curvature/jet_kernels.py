@@ -19,8 +19,8 @@ CERTAIN_GAP = 12.5
 FILLED_UP_TO = 4
 # Monomials up to degree 12, the products of two of degree 6
 PRODUCTS = 91
-# Of each row of normal equations: where the heights and the columns of the identity stand, and its length, a multiple
-# of what one instruction takes
+# Of each row of normal equations: where the heights stand, behind the 28 monomials up to degree 6, and six columns of
+# the identity; and its length, which is filled up to a multiple of what two instructions take
 HEIGHTS_AT, IDENTITY_AT, EQUATION = 28, 29, 40
 # Sizes apart of two fits that judge each other's bias: about twice as many points
 JUDGE_STEPS = 2

@@ -369,6 +369,8 @@ def _blocks(
         again: True if they were weighed in these. Blocks grow from where those met, so that what was cut is weighed
             together.
     """
+    if len(features) < 2:
+        return [_Block(features, crossings, frozenset(origins))]
     reach = np.array([sizes_of(feature, tip).half_width for feature in features])
     told = [
         distances(places.points, feature.axis) < NEIGHBOURHOOD_REACH * half
@@ -379,7 +381,7 @@ def _blocks(
         of_block = np.logical_or.reduce([told[k] for k in block])
         return len(block) > CROWDED or work_of(CROWDED_PARAMETERS * len(block), int(of_block.sum())) > 1.0
 
-    if len(features) < 2 or not too_many(range(len(features))):
+    if not too_many(range(len(features))):
         return [_Block(features, crossings, frozenset(origins))]
     gap = gaps(features, list(reach))
     strength = np.array([feature.evidence.snr for feature in features])

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from mapping.inference.families.free_tip import with_free_tip as with_free_tip, with_nominal_tip as with_nominal_tip
     from mapping.inference.families.groove import Crossing as Crossing, GrooveShape as GrooveShape
     from mapping.inference.families.line_ends import tells_of_line as tells_of_line
+    from mapping.inference.families.nodes import LineShape as LineShape
     from mapping.inference.families.pit import PitShape as PitShape
     from mapping.inference.families.problem import (
         MEETING_REACH as MEETING_REACH,
@@ -68,6 +69,7 @@ _PUBLIC = {
     "free_tip": ("with_free_tip", "with_nominal_tip"),
     "groove": ("Crossing", "GrooveShape"),
     "line_ends": ("tells_of_line",),
+    "nodes": ("LineShape",),
     "pit": ("PitShape",),
     "problem": (
         "MEETING_REACH",

@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from mapping import FloatArray
 from mapping.inference.curves import Chart, CurveModes
 from mapping.inference.families.bump import Spot
-from mapping.inference.likelihood import Window
+from mapping.inference.likelihood import Shape, Window
 
 # Two Gauss points average a template over its bin: exact for cubics between kinks.
 NODES = np.array([-1.0, 1.0]) / np.sqrt(3.0)
+
+
+class LineShape(Shape, Protocol):
+    """A shape along a chart: its first parameters are the lateral modes of its course."""
+
+    @property
+    def chart(self) -> Chart: ...
+
+    @property
+    def modes(self) -> CurveModes: ...
+
+    @property
+    def tip_radius(self) -> float: ...
 
 
 def line_nodes(

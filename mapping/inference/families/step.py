@@ -10,34 +10,20 @@ import numpy as np
 
 from mapping import FloatArray
 from mapping.inference.curves import Chart, CurveModes
-from mapping.inference.families.nodes import line_nodes
+from mapping.inference.families.nodes import LineShape, line_nodes
 from mapping.inference.likelihood import Prior, Window
 
 
-class Upright(Protocol):
+class Upright(LineShape, Protocol):
     """What a step must know of a groove with upright walls that runs along its edge: see `GrooveShape`."""
 
     @property
     def window(self) -> Window: ...
 
     @property
-    def chart(self) -> Chart: ...
-
-    @property
-    def modes(self) -> CurveModes: ...
-
-    @property
-    def tip_radius(self) -> float: ...
-
-    @property
-    def names(self) -> tuple[str, ...]: ...
-
-    @property
     def places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
 
     def taken(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]: ...
-
-    def templates(self, theta: FloatArray) -> FloatArray: ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     )
     from mapping.inference.kinds.lines import (
         LineKind as LineKind,
-        LineShape as LineShape,
         Parameters as Parameters,
         Traced as Traced,
     )
@@ -45,7 +44,7 @@ _PUBLIC = {
         "kind_of",
         "sizes_of",
     ),
-    "lines": ("LineKind", "LineShape", "Parameters", "Traced"),
+    "lines": ("LineKind", "Parameters", "Traced"),
     "points": ("PointKind", "PointShape", "Seen"),
     "posterior_density": ("felt_beside", "height_prior", "place_prior"),
 }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from mapping.inference.curves import (
 )
 from mapping.inference.families import (
     MEETING_REACH,
+    LineShape,
     PosteriorProblem,
     Sizes,
     Surroundings,
@@ -30,7 +30,7 @@ from mapping.inference.families import (
 )
 from mapping.inference.kinds.kind import Kind, sizes_of
 from mapping.inference.kinds.posterior_density import pose
-from mapping.inference.likelihood import Normal, Prior, Shape, Uniform, Window
+from mapping.inference.likelihood import Normal, Prior, Uniform, Window
 from mapping.inference.sampler import find_optima
 
 # Chords of the chart may sag by this share of the feature's height.
@@ -41,19 +41,6 @@ MOST_LEGS = 300
 OPEN = 1.0
 # After so many degrees in a row that are no better than a lower one, no higher one is tried.
 FUTILE_DEGREES = 2
-
-
-class LineShape(Shape, Protocol):
-    """A shape along a chart: its first parameters are the lateral modes of its course."""
-
-    @property
-    def chart(self) -> Chart: ...
-
-    @property
-    def modes(self) -> CurveModes: ...
-
-    @property
-    def tip_radius(self) -> float: ...
 
 
 @dataclass(frozen=True, eq=False)
