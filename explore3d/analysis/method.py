@@ -93,6 +93,10 @@ TOO_LITTLE_FELT = "too little was felt to hold the model against it: a wrong one
 FAILED = "could not be done"
 # Why what is fainter than single sweeps show is not sought
 SHOWS_ALL = "a single sweep shows all that the scene asks for"
+_NO_BASE = (
+    "lies on the base that was found for it: what is a detail and what is the body is a guess there, and neither sizes "
+    "nor the limit are to be relied on; --form and --mask say what the base is"
+)
 _TOO_WIDE = "stands off the base and is wider than fine features are: only its edges are sought"
 # Of these so many are described one by one
 MOST_STANDING = 5
@@ -285,6 +289,9 @@ def fitted(work: Work, share: Share) -> None:
     _keep_aside(work, work.given)
     again = work.given is not None and _was_found(work.given)
     work.base = refined(work.base, work.trace) if again else fit_base(work.trace, form=work.log.form)
+    on = work.base.parameters.get("on_base")
+    if isinstance(on, float) and on < 0.5:
+        work.stages.left_out.append(LeftOut(ABSORBED, f"only {100 * on:.0f} % of the profile {_NO_BASE}"))
     for bend in _bends(work.base, "absorbed"):
         end = "was taken for the base's own form; if it is a feature, say --form line, arc or poly:2, or --mask it"
         work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {end}"))

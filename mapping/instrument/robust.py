@@ -23,11 +23,10 @@ MANY = 20
 
 @dataclass(frozen=True, eq=False)
 class RobustFit:
-    """Coefficients (P,), residuals (N,), and `cost`: truncated chi-square plus P log N (lower is better)."""
+    """Coefficients (P,) and residuals (N,)."""
 
     coefficients: FloatArray
     residual: FloatArray
-    cost: float
 
 
 def robust_sd(values: FloatArray) -> float:
@@ -77,8 +76,7 @@ def robust_fit(design: FloatArray, values: FloatArray, scale: float) -> RobustFi
         coefficients, residual = solve(design, values, weights)
     if many:
         coefficients = np.linalg.lstsq(triangle, coefficients, rcond=None)[0]
-    misfit = float(np.minimum((residual / floor) ** 2, FEATURE_RESIDUAL_SDS**2).sum())
-    return RobustFit(coefficients, residual, misfit + design.shape[1] * float(np.log(len(values))))
+    return RobustFit(coefficients, residual)
 
 
 def _weighted(design: FloatArray, values: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 
 from mapping import FloatArray, Surface, Trace
+from mapping.base.profiles.evidence import Scatter
 from mapping.base.profiles.form import AUTO, Form, form_line
 from mapping.base.profiles.frame import ProfileFrame
 from mapping.base.profiles.isolated_bends import Bend, isolated_bends, isolated_rest
 from mapping.base.profiles.jumps import MOST_JUMPS, are_apart, possible_jumps, steps_up
 from mapping.geometry.mesh import Spline, spline_design
-from mapping.instrument import FEATURE_RESIDUAL_SDS, RobustFit, neighbour_scatter, robust_fit, robust_scale
+from mapping.instrument import RobustFit, neighbour_scatter, robust_fit, robust_scale
 
 # A base bends over no less than this many tip radii: shorter details are features.
 SHORTEST_BEND = 8.0
 # Pieces that are tried; the evidence chooses.
 PIECES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 PROFILE_CELLS = 480
-# A curve all pieces of which are told is taken before a likelier one with a piece that nothing tells, if it comes as
-# near to the profile but for so much: of its variance at most three quarters are of something else
-AS_NEAR = 2.0
+# Of the greatest height: an exact profile has no smaller scatter than its digits
+LEAST_DIGITS = 1e-12
 # A place is a parameter that only one cell in n fits: it costs twice what a height does (2 log n against log n)
 EDGE_FREEDOM = 2
 # A piece of a cubic has four coefficients: with fewer places between masked stretches than that nothing determines it
@@ -32,10 +32,10 @@ CELLS_PER_PIECE = 4
 def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[Surface, dict[str, Any]]:
     """A ribbon under the smooth part of a profile.
 
-    Splines of growing freedom (a line, a parabola, cubics) are fitted to the centres by robust least
-    squares and the one with the best truncated evidence is taken; the ribbon is its parallel curve one tip
-    radius inward. Where the profile steps for good from one level to another the spline keeps to the longest of them,
-    if by the same evidence the edges are worth their places and heights.
+    Splines of growing freedom (a line, a parabola, cubics) are fitted to the centres by robust least squares and the
+    one with the best evidence is taken: most places lie on it, others stand off it by anything. The ribbon is its
+    parallel curve one tip radius inward. Where the profile steps for good from one level to another the spline keeps
+    to the longest of them, if by the same evidence the edges are worth their places and heights.
 
     Args:
         trace: along one line.
@@ -43,7 +43,8 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
         form: "auto", or what the base is instead of a spline; stretches that are masked do not count.
 
     Returns:
-        The ribbon and what was fitted: degree, number of pieces and their length, m, or the form; "absorbed": what
+        The ribbon and what was fitted: degree, number of pieces and their length, m, "on_base" (the share of the
+        profile that lies on it), or the form; "absorbed": what
         stands alone and was taken for form by "auto", and "left standing": what "auto" left although it is wider than
         fine features are, if anything: height, width (m) and place ([x, y, z], m) of each.
 
@@ -69,7 +70,7 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
         if form.masks and np.histogram(x, knots[degree : len(knots) - degree])[0].min() < CELLS_PER_PIECE:
             continue
         splines.append(_Spline(spline_design(x, knots, degree), knots, degree, pieces))
-    best, chosen, edges = _likeliest(splines, x, z, scale)
+    best, chosen, edges, on = _likeliest(splines, x, z, scale)
     knots, degree, pieces = chosen.knots, chosen.degree, chosen.pieces
     heights = np.append(0.0, np.cumsum(best.coefficients[chosen.design.shape[1] :]))
     level = steps_up(edges, len(x)).sum(axis=1).astype(np.int64)
@@ -80,6 +81,7 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
     places = np.linspace(start, stop, 64 * pieces + 1)
     ribbon = _ribbon(trace.tip_radius, frame, places, curve(places), curve.derivative()(places))
     fitted: dict[str, Any] = {"degree": float(degree), "pieces": float(pieces), "piece_length": (stop - start) / pieces}
+    fitted["on_base"] = on
     bends = isolated_bends(x, z, curve(x), scale) if pieces > 1 else []
     rest = isolated_rest(x, z, curve(x), scale, SHORTEST_BEND * trace.tip_radius)
     if edges:
@@ -97,46 +99,45 @@ class _Spline:
     degree: int
     pieces: int
 
-    def is_told_by(self, x: FloatArray, residual: FloatArray, scale: float) -> bool:
-        """True if each piece has enough places that are not left out as details: without them it would go anywhere."""
-        kept = x[np.abs(residual) < FEATURE_RESIDUAL_SDS * scale]
-        edges = self.knots[self.degree : len(self.knots) - self.degree]
-        return self.pieces == 1 or bool(np.histogram(kept, edges)[0].min() >= CELLS_PER_PIECE)
-
 
 def _likeliest(
     splines: list[_Spline], x: FloatArray, z: FloatArray, scale: float
-) -> tuple[RobustFit, _Spline, list[int]]:
-    """The spline with the edges that are worth their price, and these; its further coefficients are their heights."""
+) -> tuple[RobustFit, _Spline, list[int], float]:
+    """The spline with the edges that are worth their price, these, and which share of the profile lies on it.
+
+    Its further coefficients are the edges' heights.
+    """
+    count = len(z)
+    candidates = [int(i) for i in possible_jumps(x, z, scale)]
+    least = max(scale, LEAST_DIGITS * float(np.abs(z).max()), np.finfo(float).tiny)
+    freest = robust_fit(np.hstack([splines[-1].design, steps_up(candidates, count)]), z, least).residual
+    span = max(float(np.ptp(robust_fit(splines[0].design, z, least).residual)), least)
+    scatter = Scatter.left_by(freest, least, span)
 
     def best(edges: list[int]) -> tuple[float, RobustFit, _Spline]:
-        up = steps_up(edges, len(z))
-        fits = [(robust_fit(np.hstack([each.design, up]), z, scale), each) for each in splines]
-        fit, spline = min(fits, key=lambda pair: pair[0].cost)
-        reach = AS_NEAR * max(robust_scale(fit.residual), scale)
-        told = [
-            pair
-            for pair in fits
-            if pair[1].is_told_by(x, pair[0].residual, scale) and robust_scale(pair[0].residual) <= reach
-        ]
-        fit, spline = min(told or [(fit, spline)], key=lambda pair: pair[0].cost)
-        return fit.cost + EDGE_FREEDOM * len(edges) * float(np.log(len(z))), fit, spline
+        up = steps_up(edges, count)
+        designs = [(each, np.hstack([each.design, up])) for each in splines]
+        # a curve may be held by the half of a profile that is fine, or by all of it where all is rough
+        scales = {least, max(least, robust_scale(freest))}
+        fits = [(robust_fit(design, z, sd), each) for each, design in designs for sd in scales]
+        rigid = [(fit, each) for fit, each in fits if each.pieces == 1]
+        fits += [(scatter.on_densest(np.hstack([each.design, up]), fit), each) for fit, each in rigid]
+        price = scatter.price(count)
 
-    candidates = [int(i) for i in possible_jumps(x, z, scale)]
-    if (
-        candidates
-    ):  # a spline so free that it follows roughness would follow half of an edge: what it leaves is no signal
-        freest = np.hstack([splines[-1].design, steps_up(candidates, len(z))])
-        scale = max(scale, robust_scale(robust_fit(freest, z, scale).residual))
+        def cost(fit: RobustFit) -> float:
+            return scatter.misfit(fit.residual) + price * (len(fit.coefficients) + EDGE_FREEDOM * len(edges))
+
+        return min(((cost(fit), fit, each) for fit, each in fits), key=lambda found: found[0])
+
     edges = list[int]()
     cost, fit, spline = best(edges)
     while len(edges) < MOST_JUMPS:
-        further = [[*edges, i] for i in candidates if i not in edges and are_apart([*edges, i], len(z))]
+        further = [[*edges, i] for i in candidates if i not in edges and are_apart([*edges, i], count)]
         tried = [(*best(some), some) for some in further]
         if not tried or min(each[0] for each in tried) >= cost:
             break
         cost, fit, spline, edges = min(tried, key=lambda each: each[0])
-    return fit, spline, sorted(edges)
+    return fit, spline, sorted(edges), scatter.share_on(fit.residual)
 
 
 def _listed(name: str, bends: list[Bend], frame: ProfileFrame, curve: Spline) -> dict[str, Any]:
