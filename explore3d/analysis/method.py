@@ -311,6 +311,17 @@ def _described(bend: dict[str, Any]) -> str:
     return f"a {kind} {height} {sense} and {width} wide at ({place}) mm"
 
 
+def _open_end_text(end: dict[str, Any]) -> str:
+    length = length_text(float(np.linalg.norm(np.subtract(end["to"], end["from"]))), 2)
+    place = ", ".join(f"{1e3 * value:.4g}" for value in end["from"])
+    way = "below" if end["height"] < 0 else "above"
+    return (
+        f"from ({place}) mm to its end, {length}, the profile stands off its base for good, up to "
+        f"{length_text(abs(end['height']), 2)} {way} it: a detail that the end cuts, or the body's own edge; nothing "
+        "is told of it"
+    )
+
+
 def _was_found(base: Base) -> bool:
     return base.kind not in ("mesh", "profile")
 
@@ -415,8 +426,18 @@ def deviated(work: Work, share: Share) -> None:
 
 
 def kept_over_base(work: Work, share: Share) -> None:
-    """The trace on its base, without the part beyond the border of one found by feeling: there nothing is known."""
+    """The trace on its base, without the part beyond the border of one found by feeling: there nothing is known.
+
+    Nor is there where a profile leaves its base for good: neither of the detail that its end cuts, nor of an edge.
+    """
     work.laid = LaidTrace.of(work.trace, work.base)
+    ends = _bends(work.base, "open_ends")
+    if ends:
+        inside = ~np.any(
+            [(work.trace.centers - end["from"]) @ np.subtract(end["to"], end["from"]) > 0 for end in ends], 0
+        )
+        work.laid, work.trace = work.laid.within(inside), work.trace.select(inside)
+        work.stages.left_out += [LeftOut(ABSORBED, _open_end_text(end)) for end in ends]
     if _was_found(work.base):
         inside = over_base(work.laid, work.base)
         if inside.any() and not inside.all():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -62,6 +63,32 @@ class Scatter:
     def share_on(self, residual: FloatArray) -> float:
         """Share of the places that lie on the curve."""
         return 1.0 - _mixture(residual, self.least, self.span).off
+
+    def ends_on(self, residual: FloatArray, edges: Sequence[int]) -> bool:
+        """True if most of what lies before the first edge, and beyond the last one, lies on the level there."""
+        within = FEATURE_RESIDUAL_SDS * _mixture(residual, self.least, self.span).sd
+        ends = residual[: min(edges) + 1], residual[max(edges) + 1 :]
+        return all(float(np.median(np.abs(end))) < within for end in ends)
+
+    def felt_part(self, residual: FloatArray, price: float) -> tuple[int, int]:
+        """Indices [first, last) of the part of a profile that comes back to its curve (N,) at either end.
+
+        What stands off beyond the last place on it may go on anywhere: it is left out where its places there cost more
+        than `price`.
+        """
+        found = _mixture(residual, self.least, self.span)
+        density = _on(residual, found.sd, found.off, self.span)[1]
+        usual = 1.0 - 2.0 * np.log((1.0 - found.off) / (np.sqrt(2.0 * np.pi) * found.sd))
+        saved = (-2.0 * np.log(density) - usual) / self.places
+        cut = [0, 0]
+        for side, order in enumerate((slice(None), slice(None, None, -1))):
+            off = residual[order]
+            out = np.sign(off[0]) * off > FEATURE_RESIDUAL_SDS * found.sd
+            run = len(out) if out.all() else int(np.argmin(out))
+            if float(saved[order][:run].sum()) > price:
+                back = np.sign(off[0]) * off[run:] < found.sd
+                cut[side] = run + int(np.argmax(back))
+        return cut[0], len(residual) - cut[1]
 
     def on_densest(self, design: FloatArray, fit: RobustFit) -> RobustFit:
         """A fit (N, P) moved onto the height off it at which most places lie, as long as it goes on winning places.

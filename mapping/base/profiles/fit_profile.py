@@ -44,9 +44,9 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
 
     Returns:
         The ribbon and what was fitted: degree, number of pieces and their length, m, "on_base" (the share of the
-        profile that lies on it), or the form; "absorbed": what
-        stands alone and was taken for form by "auto", and "left standing": what "auto" left although it is wider than
-        fine features are, if anything: height, width (m) and place ([x, y, z], m) of each.
+        profile that lies on it), or the form; "open_ends" that do not come back to it (from, to, height); "absorbed":
+        what stands alone and was taken for form by "auto", and "left standing": what "auto" left although it is wider
+        than fine features are, if anything: height, width (m) and place ([x, y, z], m) of each.
 
     Raises:
         FormError: a form that does not fit this profile.
@@ -70,7 +70,7 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
         if form.masks and np.histogram(x, knots[degree : len(knots) - degree])[0].min() < CELLS_PER_PIECE:
             continue
         splines.append(_Spline(spline_design(x, knots, degree), knots, degree, pieces))
-    best, chosen, edges, on = _likeliest(splines, x, z, scale)
+    best, chosen, edges, scatter = _likeliest(splines, x, z, scale)
     knots, degree, pieces = chosen.knots, chosen.degree, chosen.pieces
     heights = np.append(0.0, np.cumsum(best.coefficients[chosen.design.shape[1] :]))
     level = steps_up(edges, len(x)).sum(axis=1).astype(np.int64)
@@ -81,12 +81,15 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
     places = np.linspace(start, stop, 64 * pieces + 1)
     ribbon = _ribbon(trace.tip_radius, frame, places, curve(places), curve.derivative()(places))
     fitted: dict[str, Any] = {"degree": float(degree), "pieces": float(pieces), "piece_length": (stop - start) / pieces}
-    fitted["on_base"] = on
+    fitted["on_base"] = scatter.share_on(best.residual)
+    felt = scatter.felt_part(best.residual, EDGE_FREEDOM * scatter.price(len(x)))
     bends = isolated_bends(x, z, curve(x), scale) if pieces > 1 else []
     rest = isolated_rest(x, z, curve(x), scale, SHORTEST_BEND * trace.tip_radius)
     if edges:
         known = np.unique(heights)
         fitted["levels"] = known[np.argsort(np.abs(known), kind="stable")].tolist()
+    if ends := _open_ends(x, z - curve(x), felt, frame, curve):
+        fitted["open_ends"] = ends
     return ribbon, fitted | _listed("absorbed", bends, frame, curve) | _listed("left standing", rest, frame, curve)
 
 
@@ -102,8 +105,8 @@ class _Spline:
 
 def _likeliest(
     splines: list[_Spline], x: FloatArray, z: FloatArray, scale: float
-) -> tuple[RobustFit, _Spline, list[int], float]:
-    """The spline with the edges that are worth their price, these, and which share of the profile lies on it.
+) -> tuple[RobustFit, _Spline, list[int], Scatter]:
+    """The spline with the edges that are worth their price, these, and by which scatter it was judged.
 
     Its further coefficients are the edges' heights.
     """
@@ -134,10 +137,24 @@ def _likeliest(
     while len(edges) < MOST_JUMPS:
         further = [[*edges, i] for i in candidates if i not in edges and are_apart([*edges, i], count)]
         tried = [(*best(some), some) for some in further]
+        tried = [each for each in tried if scatter.ends_on(each[1].residual, each[-1])]
         if not tried or min(each[0] for each in tried) >= cost:
             break
         cost, fit, spline, edges = min(tried, key=lambda each: each[0])
-    return fit, spline, sorted(edges), scatter.share_on(fit.residual)
+    return fit, spline, sorted(edges), scatter
+
+
+def _open_ends(
+    x: FloatArray, off: FloatArray, felt: tuple[int, int], frame: ProfileFrame, curve: Spline
+) -> list[dict[str, Any]]:
+    """Of each end that leaves the curve for good: from where and to where, [x, y, z], and how high at most, m."""
+    first, last = felt
+
+    def place(k: int) -> list[float]:
+        return [float(each) for each in frame.origin + x[k] * frame.along + float(curve(x[k])) * frame.outward]
+
+    ends = [(first, 0, off[:first])] * (first > 0) + [(last - 1, len(x) - 1, off[last:])] * (last < len(x))
+    return [{"from": place(a), "to": place(b), "height": float(part[np.abs(part).argmax()])} for a, b, part in ends]
 
 
 def _listed(name: str, bends: list[Bend], frame: ProfileFrame, curve: Spline) -> dict[str, Any]:

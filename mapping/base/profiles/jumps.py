@@ -20,6 +20,9 @@ JUMP_SDS = 6.0
 KEPT_SHARE = 0.5
 # Edges that are looked at, the highest: a staircase has no more levels of the shortest length
 MOST_JUMPS = 7
+# Places beyond the last edge, or before the first, at least: what is there does not come back, so it is no detail
+# however short it is, and its median bears one place on the edge itself
+FEWEST_AT_END = 3
 
 
 def possible_jumps(x: FloatArray, z: FloatArray, scale: float) -> IntArray:
@@ -39,7 +42,7 @@ def possible_jumps(x: FloatArray, z: FloatArray, scale: float) -> IntArray:
     found = []
     for i in np.flatnonzero(np.abs(off) > JUMP_SDS * usual):
         before, after = slice(max(i + 1 - side, 0), i + 1), slice(i + 1, i + 1 + side)
-        if i + 1 < side or len(z) - i - 1 < side:
+        if min(i + 1, len(z) - i - 1) < FEWEST_AT_END:
             continue
         level = np.median(z[after] - slope * x[after]) - np.median(z[before] - slope * x[before])
         if KEPT_SHARE < level / off[i] < 1.0 / KEPT_SHARE:
@@ -48,9 +51,8 @@ def possible_jumps(x: FloatArray, z: FloatArray, scale: float) -> IntArray:
 
 
 def are_apart(edges: list[int], count: int) -> bool:
-    """True if all levels between edges, and at both ends, are long enough."""
-    bounds = np.array([-1, *sorted(edges), count - 1])
-    return bool(np.diff(bounds).min() >= SHORTEST_LEVEL * count)
+    """True if all levels between edges are long enough."""
+    return bool(np.diff(sorted(edges)).min(initial=count) >= SHORTEST_LEVEL * count)
 
 
 def steps_up(edges: list[int], count: int) -> FloatArray:

@@ -47,6 +47,24 @@ def test_the_base_is_the_level_that_most_lies_on_though_the_most_is_no_half() ->
 
 
 @pytest.mark.parametrize("rough", [0.0, 2e-6])
+@pytest.mark.parametrize(("begins", "ends"), [(None, 11.3e-3), (0.7e-3, 11.3e-3), (None, None)])
+def test_ends_that_leave_the_base_for_good_are_told(rough: float, begins: float | None, ends: float | None) -> None:
+    """A chamfer, or the flank of a groove that the end cuts; a groove that ends before it is none."""
+    body = np.zeros_like(X) if begins is None else 0.5 * np.maximum(0.0, begins - X)
+    body -= 0.0 if ends is None else 0.5 * np.maximum(0.0, X - ends)
+    body -= 0.1e-3 * (np.abs(X - 11.0e-3) < 0.2e-3)
+    told = base_of(body, rough).parameters.get("open_ends", [])
+    at = [place for place in (begins, ends) if place is not None]
+    assert isinstance(told, list) and [end["from"][0] for end in told] == pytest.approx(at, abs=0.05e-3)
+    assert [np.sign(end["height"]) for end in told] == [np.sign(0.5 - (place > 1e-3)) for place in at]
+
+
+def test_a_drop_before_the_end_is_a_level_and_no_open_end() -> None:
+    base = base_of(-0.3e-3 * (X > 11.5e-3), 2e-6)
+    assert base.levels == pytest.approx([0.0, -0.3e-3], abs=2e-6) and "open_ends" not in base.parameters
+
+
+@pytest.mark.parametrize("rough", [0.0, 2e-6])
 def test_roughness_is_no_form(rough: float) -> None:
     """A curve that is free to follow it had sixteen pieces: each place counted as if it were alone."""
     base = base_of(-((X - 6e-3) ** 2) / 60e-3, rough)
