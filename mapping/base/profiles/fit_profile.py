@@ -14,7 +14,7 @@ from mapping.base.profiles.frame import ProfileFrame
 from mapping.base.profiles.isolated_bends import Bend, isolated_bends, isolated_rest
 from mapping.base.profiles.jumps import MOST_JUMPS, are_apart, possible_jumps, steps_up
 from mapping.geometry.mesh import Spline, spline_design
-from mapping.instrument import RobustFit, neighbour_scatter, robust_fit, robust_scale
+from mapping.instrument import RobustFit, fit_on_densest, neighbour_scatter, robust_fit, robust_scale
 
 # A base bends over no less than this many tip radii: shorter details are features.
 SHORTEST_BEND = 8.0
@@ -124,7 +124,7 @@ def _likeliest(
         scales = {least, max(least, robust_scale(freest))}
         fits = [(robust_fit(design, z, sd), each) for each, design in designs for sd in scales]
         rigid = [(fit, each) for fit, each in fits if each.pieces == 1]
-        fits += [(scatter.on_densest(np.hstack([each.design, up]), fit), each) for fit, each in rigid]
+        fits += [(fit_on_densest(np.hstack([each.design, up]), fit, least, scatter.span), each) for fit, each in rigid]
         price = scatter.price(count)
 
         def cost(fit: RobustFit) -> float:

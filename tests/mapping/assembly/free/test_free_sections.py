@@ -118,6 +118,20 @@ def test_a_step_through_which_the_base_was_drawn_stays_a_step() -> None:
     assert [feature.kind for feature in found] == ["step"] and not found[0].details.free_section
 
 
+def test_of_a_rack_the_teeth_are_as_high_and_as_wide_as_they_are() -> None:
+    """Its roots, two fifths of it, are the base: what they scatter by is not the others' height."""
+
+    def rack(u: FloatArray) -> FloatArray:
+        away = np.abs((u / 400e-6 + 0.5) % 1.0 - 0.5)
+        return np.asarray(-50e-6 * np.clip((0.35 - away) / 0.15, 0.0, 1.0))
+
+    found = felt(rack, 3)
+    assert len(found) == 10 and {feature.kind for feature in found} == {"bump"}
+    for feature in found:
+        assert feature.height.median == pytest.approx(50e-6, abs=0.1e-6)
+        assert feature.width.median == pytest.approx(240e-6, abs=1e-6) and feature.details.misfit is None
+
+
 def test_rough_and_bare_profiles_hold_none() -> None:
     assert felt(lambda u: 0.0 * u, 5) == ()
 
