@@ -34,7 +34,7 @@ from mapping.assembly import (
     why_none_sought,
     without_wide,
 )
-from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
+from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined, sheet_moved
 from mapping.detection import RAW_SAMPLES, Detections, detect, narrowest_groove, recovered
 from mapping.detection.path import (
     Backlash,
@@ -71,7 +71,7 @@ from mapping.estimate.envelope import (
 from mapping.geometry.curvature import principal_curvatures
 from mapping.geometry.mesh import distances
 from mapping.inference.joint import refine_all
-from mapping.inference.kinds import kind_of
+from mapping.inference.kinds import kind_of, sizes_of
 from mapping.model import Judgement, ObjectModel, Tolerance, dropped_crossings, dropped_features, judged
 
 if TYPE_CHECKING:
@@ -718,6 +718,26 @@ def believed(work: Work, share: Share) -> None:
         work.features = tuple(_doubted(feature, work.backlash, tip) for feature in work.features)
     if work.yielding is not None:
         work.features = tuple(_pressed(feature, work.yielding, work.laid) for feature in work.features)
+    work.features = tuple(_on_sheet(feature, work) for feature in work.features)
+
+
+def _on_sheet(feature: Feature, work: Work) -> Feature:
+    """The feature with what a sheet may have taken of it that was fitted through it and bends as tightly."""
+    pieces, tip, height = work.base.parameters.get("pieces"), work.trace.tip_radius, feature.height
+    if not isinstance(pieces, list) or work.log.detections or kind_of(feature).sided:
+        return feature
+    width = max(2.0 * sizes_of(feature, tip).half_width, feature.width.high)
+    rise = sheet_moved(work.trace, [round(each) for each in pieces if isinstance(each, float)], feature.axis, width)
+    if 2.0 * abs(rise) < height.high - height.low:
+        return feature
+    lies = f"{length_text(abs(rise), 2)} {'higher' if rise > 0.0 else 'lower'}"
+    note = (
+        f"the base bends as tightly as this {feature.kind} and was fitted through it: without what was felt of it the "
+        f"base lies {lies}; its height is told over that, and in doubt by as much"
+    )
+    work.stages.left_out.append(LeftOut(ABSORBED, f"at {place_text(feature.axis.mean(axis=0), tip)} {note}"))
+    over = replace(height, median=height.median - rise, low=height.low - rise, high=height.high - rise)
+    return replace(feature, height=over.with_doubt(abs(rise)), notes=(*feature.notes, note))
 
 
 def _felt_alone(work: Work, told: Sequence[Feature]) -> list[Feature]:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         on_walls as on_walls,
         onto_base as onto_base,
     )
+    from mapping.base.quadrics import sheet_moved as sheet_moved
     from mapping.base.terraces import over_levels as over_levels
 
 _PUBLIC = {
@@ -43,6 +44,7 @@ _PUBLIC = {
     "pose": ("Pose", "estimate_pose"),
     "profiles": ("SHORTEST_LEVEL", "Form"),
     "projection": ("WALL_COSINE", "between_walls", "on_walls", "onto_base"),
+    "quadrics": ("sheet_moved",),
     "terraces": ("over_levels",),
 }
 doorway(__name__, _PUBLIC)

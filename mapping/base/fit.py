@@ -16,6 +16,7 @@ from mapping.base.polyhedron import polyhedron
 from mapping.base.profiles import AUTO, Form, fit_profile, profile_frame
 from mapping.base.quadrics import (
     FAMILIES,
+    MOST_BASE_CELLS,
     Cloud,
     Family,
     Fitted,
@@ -34,7 +35,6 @@ from mapping.base.terraces import END_SHARE, terraced_plane, terraced_quadric
 from mapping.geometry.mesh import NearestPoint
 from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_scale, robust_sd, unshared
 
-MOST_BASE_CELLS = 4000
 # Families for what no simple one explains
 FREE: tuple[Family, ...] = (
     *(partial(sheet, shortest=shortest) for shortest in (5.0, 2.5)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,7 +12,7 @@ from mapping import BoolArray, FloatArray, IntArray, Surface, Trace
 from mapping.base.base import FIT_MARGIN, FitValue
 from mapping.base.cells import Cells
 from mapping.base.profiles import SHORTEST_BEND
-from mapping.geometry.mesh import spline_design
+from mapping.geometry.mesh import distances, spline_design
 from mapping.instrument import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_fit, robust_scale
 
 # Upward part of the mean direction from a round body's middle of what was felt inside it, without contact normals
@@ -32,7 +32,11 @@ FEWEST_FACETS, FACETS_OF_PIECE = 96, 12
 # Coefficients of a sheet: a bound on the time, which grows with their cube (300 take 0.8 CPU s). Pieces are longer
 # where more would be needed, down to so many along an axis, of which both axes together fit the bound
 MOST_COEFFICIENTS, FEWEST_PIECES = 300, 8
-
+# Cells of a trace that bodies are fitted to, at most
+MOST_BASE_CELLS = 4000
+# Widths of a detail beyond which nothing of it is left: a bell's width is 2.3 standard deviations to either side, where
+# the tangents of its flanks meet the base, and at 1.5 times that it is as high as 0.3 % of its crest
+OF_DETAIL = 1.5
 
 # Columns (N, P) of a field that is linear in its coefficients, at x and y (N,)
 Design = Callable[[FloatArray, FloatArray], FloatArray]
@@ -321,6 +325,12 @@ def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
     ]
     if min(pieces) < 1 or len(cloud.points) < 4 * (pieces[0] + 3) * (pieces[1] + 3):
         return None
+    return _sheet_of(cloud, pieces)
+
+
+def _sheet_of(cloud: Cloud, pieces: Sequence[int], among: BoolArray | None = None) -> Fitted:
+    """A sheet of so many pieces along both axes, through all cells or some (C,)."""
+    low, high = cloud.extent
     knots = [
         np.concatenate([[low[i]] * 3, np.linspace(low[i], high[i], pieces[i] + 1), [high[i]] * 3]) for i in range(2)
     ]
@@ -336,7 +346,29 @@ def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
         for i in range(2)
     )
     bends = np.vstack([np.kron(along, np.eye(count[1])), np.kron(np.eye(count[0]), across)])
-    return height_field(design, "sheet", cloud, bends, pieces=(pieces[0], pieces[1]))
+    fitted = height_field(design, "sheet", cloud, bends, among, (pieces[0], pieces[1]))
+    return replace(fitted, parameters=fitted.parameters | {"pieces": [float(n) for n in pieces]})
+
+
+def sheet_moved(trace: Trace, pieces: Sequence[int], axis: FloatArray, width: float) -> float:
+    """How far a sheet that was fitted through a detail moves under it, m, if nothing of the detail is fitted.
+
+    Above zero if it rises. Where its pieces are as short as the detail, the sheet takes a part of it, and without it
+    only its neighbours and its stiffness say where it lies: the truth is between the two.
+
+    Args:
+        trace: that the sheet was fitted to.
+        pieces: of it along both axes.
+        axis: (N, 3) middle of the detail, m.
+        width: of it, m.
+    """
+    cloud = Cloud.of(trace, MOST_BASE_CELLS)
+    # in the plane over which the sheet is a height: the centres are a radius above the detail
+    line = ((axis - cloud.origin) @ cloud.axes.T) * [1.0, 1.0, 0.0]
+    away = distances(cloud.points * [1.0, 1.0, 0.0], line)
+    fits = [_sheet_of(cloud, pieces, among) for among in (None, away > 0.5 * OF_DETAIL * width)]
+    middle = away <= max(0.25 * width, float(away.min()))
+    return float(np.median((fits[0].residual - fits[1].residual)[middle]))
 
 
 def sphere(cloud: Cloud) -> Fitted | None:

@@ -8,7 +8,7 @@ import pytest
 from mapping.arrays import FloatArray
 from mapping.base.base import Base
 from mapping.base.fit import fit_base
-from mapping.base.quadrics import Cloud, sheet
+from mapping.base.quadrics import Cloud, sheet, sheet_moved
 from mapping.trace import Trace
 
 TIP, NOISE = 0.01, 2e-5
@@ -165,3 +165,17 @@ def test_a_sheet_follows_as_many_waves_as_it_has_pieces_for() -> None:
     assert fit is not None and np.median(np.abs(fit.residual)) < 2.0 * NOISE
     base = Base(fit.surface(Cloud.of(trace, 4000), None), fit.kind, fit.parameters)
     assert np.median(missed(base, lines)) < NOISE
+
+
+@pytest.mark.parametrize(("pieces", "taken"), [((3, 1), 0.0), ((21, 6), 0.15e-3)])
+def test_what_a_sheet_took_of_a_detail_that_it_was_fitted_through_is_told(
+    pieces: tuple[int, int], taken: float
+) -> None:
+    """A dent of 0.5 mm: pieces as short as half of it take a third of it, long ones none."""
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(0.0, 0.16, 2e-4), np.linspace(0.0, 0.05, 21)))
+    dent = -0.5e-3 * np.exp(-((x - 0.075) ** 2 + (y - 0.025) ** 2) / (2.0 * 0.004**2))
+    centers = np.column_stack([x, y, dent + 2e-3 * np.sin(2.0 * np.pi * x / 0.04) * (pieces[0] > 3)])
+    centers += 1e-5 * np.random.default_rng(8).standard_normal(centers.shape)
+    trace = Trace(np.arange(float(len(x))), centers, np.repeat(np.arange(21), 800), 3e-3)
+    rise = sheet_moved(trace, pieces, np.array([[0.075, 0.025, -3e-3]]), 12.4e-3)
+    assert rise == pytest.approx(taken, abs=max(0.4 * taken, 2e-6))
