@@ -32,7 +32,7 @@ BEGUN_ROUND = (0.1, 2.0)
 # Rounds of parting what the body explains from what stands off it, until no cell changes
 PARTED_ROUNDS = 6
 # Steps of one fit
-SECTION_STEPS = 40
+SECTION_STEPS = 100
 # Largest sine of a slope against the plane that most of the path lies in: 80 degrees
 STEEPEST_SINE = 0.985
 # Places that an arc is laid out with: chords of an arc that turns by a leave radius a^2 / 8 of so many squared, 3e-6
@@ -47,7 +47,8 @@ class _Section:
     Args:
         offset: height at the first place of the extent, m.
         sine: of the first line's slope.
-        places: (B,) middles of the arcs, m.
+        lines: (B,) lengths over the extent of the lines between arcs, m, not below 0: arcs may join, and do where a
+            ball leaves a wall's foot; the first is the place where the first arc begins.
         turns: (B,) changes of the sine: above 0 where the body is hollow.
         rounding: (B,) radii by which arcs are rounder than the sharpest that a ball can follow, m: over a sharp edge
             its centre turns on one of the tip's radius, in a sharp corner on none.
@@ -57,7 +58,7 @@ class _Section:
 
     offset: float
     sine: float
-    places: FloatArray
+    lines: FloatArray
     turns: FloatArray
     rounding: FloatArray
     tip_radius: float
@@ -67,26 +68,31 @@ class _Section:
     @property
     def spans(self) -> tuple[FloatArray, FloatArray]:
         """(B,) where the path's arcs begin and end, m."""
-        radius = np.abs(self.rounding) + np.where(self.turns < 0.0, self.tip_radius, 0.0)
-        half = 0.5 * np.abs(self.turns) * radius
-        return self.places - half, self.places + half
+        long = _arcs(self.turns, self.rounding, self.tip_radius)
+        end = np.cumsum(self.lines + long)
+        return end - long, end
+
+    @property
+    def places(self) -> FloatArray:
+        """(B,) middles of the arcs, m."""
+        return np.asarray(np.mean(self.spans, axis=0))
+
+    @property
+    def sines(self) -> FloatArray:
+        """(B + 1,) of the slopes of the lines."""
+        return self.sine + np.cumsum(np.append(0.0, self.turns))
 
     @property
     def possible(self) -> bool:
-        """True of arcs one after the other, within the extent, and of slopes that are no walls."""
+        """True of arcs within the extent, and of slopes that are no walls."""
         begin, end = self.spans
-        order = np.argsort(begin)
-        corners = np.column_stack([begin[order], end[order]]).ravel()
-        sines = self.sine + np.cumsum(np.append(0.0, self.turns[order]))
-        inside = self.low < corners[0] and corners[-1] < self.high
-        return bool((np.diff(corners) >= 0.0).all() and inside and (np.abs(sines) < STEEPEST_SINE).all())
+        inside = self.low < begin[0] and end[-1] < self.high
+        return bool(inside and (np.abs(self.sines) < STEEPEST_SINE).all())
 
     def steps(self, noise: float) -> bool:
         """True of two lines that are one another's parallels, as far as heights of a noise (m) tell, with a climb
         between them like what a ball makes of a wall: no wider than its radius, and nowhere rounder than it follows."""
-        order = np.argsort(self.places)
-        places, sines = self.places[order], np.concatenate([[0.0], np.cumsum(self.turns[order])])
-        round_ones = np.concatenate([[0], np.cumsum(self.rounding[order] > 0.0)])
+        places, sines, round_ones = self.places, self.sines, np.cumsum(np.append(0, self.rounding > 0.0))
         first, last = np.triu_indices(len(places), 1)
         turned = np.abs(sines[last + 1] - sines[first]) * (self.high - self.low)
         sharp = round_ones[last + 1] == round_ones[first]
@@ -98,7 +104,7 @@ class _Section:
         begin, end = self.spans
         share = np.linspace(0.0, 1.0, PLACES_OF_ARC)
         p, s, sine = [np.array([min(self.low, begin.min(initial=self.low))])], [np.array([self.sine])], self.sine
-        for k in np.argsort(begin, kind="stable"):
+        for k in range(len(begin)):
             p.append(begin[k] + share * (end[k] - begin[k]))
             s.append(sine + share * self.turns[k])
             sine += self.turns[k]
@@ -129,10 +135,10 @@ def extrusion(cloud: Cloud) -> Fitted | None:
     body on two levels: a step, which is a detail upon a plane (`terraced_plane`).
     """
     thinned = cloud.points[:: max(1, len(cloud.points) // SEARCHED_CELLS)]
-    direction, knots, sines, height = _pieces(thinned, cloud)
+    pieces = _pieces(thinned, cloud)
     least, best, explained = np.inf, np.zeros(0), False
     for count in range(1, MOST_ARCS + 1):
-        starts = [_start(direction, knots, sines, height, count, rounding) for rounding in BEGUN_ROUND]
+        starts = [_start(pieces, count, rounding, cloud.tip_radius) for rounding in BEGUN_ROUND]
         settled = [_settled(start, thinned, cloud) for start in starts]
         cost, now = min(((_cost(theta, thinned, cloud), theta) for theta in settled), key=lambda each: each[0])
         if cost < least:
@@ -183,12 +189,24 @@ def _across(turn: float, points: FloatArray, cloud: Cloud) -> tuple[FloatArray, 
 
 
 def _start(
-    direction: FloatArray, knots: FloatArray, sines: FloatArray, height: float, count: int, rounding: float
+    pieces: tuple[FloatArray, FloatArray, FloatArray, float], count: int, rounding: float, tip_radius: float
 ) -> FloatArray:
-    """Parameters of a section of so many bends, each rounded over so many pieces."""
+    """Parameters of a section of so many bends, each rounded over so many of the `_pieces`; those that would overlap
+    join, and are as much too far to one side as to the other."""
+    direction, knots, sines, height = pieces
     places, turns = _bent(count, knots, sines)
-    bends = np.column_stack([places, turns, np.full(count, rounding * (knots[1] - knots[0]))])
-    return np.concatenate([direction, [height, sines[0]], bends.ravel()])
+    round_by = np.full(count, rounding * (knots[1] - knots[0]))
+    half = 0.5 * _arcs(turns, round_by, tip_radius)
+    lines = np.diff(places, prepend=0.0) - half - np.append(0.0, half[:-1])
+    overlaps = np.maximum(-lines[1:], 0.0)
+    lines[1:] += overlaps
+    lines[0] -= 0.5 * overlaps.sum()
+    return np.concatenate([direction, [height, sines[0]], np.column_stack([lines, turns, round_by]).ravel()])
+
+
+def _arcs(turns: FloatArray, rounding: FloatArray, tip_radius: float) -> FloatArray:
+    """(B,) lengths over the extent of arcs of turns and rounding (B,), m."""
+    return np.asarray(np.abs(turns) * (rounding + np.where(turns < 0.0, tip_radius, 0.0)))
 
 
 def _bent(count: int, knots: FloatArray, sines: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -215,8 +233,8 @@ def _laid(theta: FloatArray, points: FloatArray, tip_radius: float) -> tuple[_Se
     """The section, its frame, and how far points reach along the line, m."""
     frame = _frame(theta)
     p, along = points @ frame[0], points @ frame[1]
-    places, turns, rounding = theta[4:].reshape(-1, 3).T
-    section = _Section(theta[2], theta[3], places, turns, rounding, tip_radius, float(p.min()), float(p.max()))
+    lines, turns, rounding = theta[4:].reshape(-1, 3).T
+    section = _Section(theta[2], theta[3], lines, turns, rounding, tip_radius, float(p.min()), float(p.max()))
     return section, frame, (float(along.min()), float(along.max()))
 
 
@@ -247,12 +265,16 @@ def _settled(theta: FloatArray, points: FloatArray, cloud: Cloud) -> FloatArray:
 
 
 def _sharpened(theta: FloatArray, cloud: Cloud) -> FloatArray:
-    """The same, sharp where an arc is no longer than two cells: the means of those beside a kink blunt it as much."""
+    """The same, sharp where an arc is no longer than two cells: the means of those beside a kink blunt it as much. The
+    lines beside it go on until they meet, or until an arc of the tip's radius fits between them."""
     steps = np.linalg.norm(np.diff(cloud.points, axis=0), axis=1)
     cell = float(np.median(steps[np.diff(cloud.sweep) == 0])) if (np.diff(cloud.sweep) == 0).any() else 0.0
-    bends = theta[4:].reshape(-1, 3).copy()
-    bends[:, 2] = np.abs(bends[:, 2])
-    bends[np.abs(bends[:, 1]) * bends[:, 2] < 2.0 * cell, 2] = 0.0
+    section = _laid(theta, cloud.points, cloud.tip_radius)[0]
+    blunted = np.abs(section.turns) * section.rounding < 2.0 * cell
+    slopes = np.arcsin(np.clip(section.sines, -STEEPEST_SINE, STEEPEST_SINE))
+    longer = np.where(blunted, section.rounding, 0.0) * np.tan(0.5 * np.abs(np.diff(slopes)))
+    lines = section.lines + np.cos(slopes[:-1]) * (longer + np.append(0.0, longer[:-1]))
+    bends = np.column_stack([lines, section.turns, np.where(blunted, 0.0, section.rounding)])
     return np.concatenate([theta[:4], bends.ravel()])
 
 
@@ -261,9 +283,12 @@ def _fit(start: FloatArray, points: FloatArray, cloud: Cloud, loss: str) -> Floa
     from scipy.optimize import least_squares
 
     size = float(np.ptp(points, axis=0).max())
-    scale = np.array([1.0, 1.0, size, 1.0, *[size, 1.0, size] * ((len(start) - 4) // 3)])
+    count = (len(start) - 4) // 3
+    scale = np.array([1.0, 1.0, size, 1.0, *[size, 1.0, size] * count])
+    free = -np.inf
+    least = np.array([*[free] * 4, *[free, free, 0.0], *[0.0, free, 0.0] * (count - 1)])
     settings: dict[str, Any] = {"loss": loss, "f_scale": cloud.floor, "x_scale": scale, "max_nfev": SECTION_STEPS}
-    found = least_squares(_missed, start, args=(points, cloud.tip_radius), **settings)
+    found = least_squares(_missed, start, args=(points, cloud.tip_radius), bounds=(least, np.inf), **settings)
     return np.asarray(found.x)
 
 
@@ -271,15 +296,13 @@ def _parameters(section: _Section, frame: FloatArray, cloud: Cloud) -> dict[str,
     """What was found, in the object frame: the line's direction, and of each bend a point of the path in its middle,
     the change of the sine of the slope there, and the radius of the body: 0 of what is as sharp as the path tells."""
     places, heights, _ = section.outline()
-    order = np.argsort(section.places)
     middles = np.column_stack([section.places, 0.0 * section.places, np.interp(section.places, places, heights)])
-    path = np.abs(section.rounding)
-    radii = np.where((section.turns > 0.0) & (path > 0.0), path + section.tip_radius, path)
+    hollow = (section.turns > 0.0) & (section.rounding > 0.0)
     return {
         "axis": (frame[1] @ cloud.axes).tolist(),
-        "middles": cloud.world(middles[order] @ frame).tolist(),
-        "turns": section.turns[order].tolist(),
-        "radii": radii[order].tolist(),
+        "middles": cloud.world(middles @ frame).tolist(),
+        "turns": section.turns.tolist(),
+        "radii": (section.rounding + np.where(hollow, section.tip_radius, 0.0)).tolist(),
     }
 
 
@@ -292,8 +315,8 @@ def _mesh(
     up = np.column_stack([-ways[:, 1], ways[:, 0]])
     path = np.column_stack([places, heights])
     outline = [path[0] - cloud.tip_radius * up[0] - cloud.margin * ways[0]]
-    for k, bend in enumerate(np.argsort(section.spans[0], kind="stable")):
-        arc = slice(1 + k * PLACES_OF_ARC, 1 + (k + 1) * PLACES_OF_ARC)
+    for bend in range(len(section.turns)):
+        arc = slice(1 + bend * PLACES_OF_ARC, 1 + (bend + 1) * PLACES_OF_ARC)
         if section.rounding[bend] > 0.0:
             outline += list(path[arc] - cloud.tip_radius * up[arc])
         elif section.turns[bend] < 0.0:
