@@ -179,7 +179,7 @@ def _lay(
     if block.beside is not None and not block.beside and not beside:
         return
     block.beside, block.laid = beside, None
-    place = neighbourhood(block.features, block.crossings, places, around, false_alarms_per_metre)
+    place = neighbourhood(block.features, block.crossings, places, around, false_alarms_per_metre, beside)
     if place is None:
         return
     place = _holding(beside, place)

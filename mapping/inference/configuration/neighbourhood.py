@@ -14,7 +14,7 @@ from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference.families import Sizes, Surroundings, tells_of_line
 from mapping.inference.joint import JoinedShape
-from mapping.inference.kinds import kind_of, sizes_of
+from mapping.inference.kinds import kind_of, rise_of, sizes_of
 from mapping.inference.likelihood import Likelihood, Shape, Window, build_likelihood
 from mapping.instrument import Noise
 
@@ -99,8 +99,9 @@ def neighbourhood(
     places: Places,
     around: Surroundings,
     false_alarms_per_metre: float,
+    beside: Sequence[Feature] = (),
 ) -> Neighbourhood | None:
-    """The neighbourhood of some features and crossings; None where too few places tell of it."""
+    """The neighbourhood of some features and crossings, with others beside; None where too few places tell of it."""
     tip = around.trace.tip_radius
     sizes = [sizes_of(feature, tip) for feature in features]
     widths = [size.half_width for size in sizes] + [thin_half_width(crossing, tip) for crossing in crossings]
@@ -124,7 +125,7 @@ def neighbourhood(
         window = replace(window, height=over_levels(window.height, window.starts[1:-1], around.base.levels))
     height = max([size.height for size in sizes] or [abs(crossing.height) for crossing in crossings])
     half_width = min([size.half_width for size in sizes] or widths)
-    nuisance = around.nuisance(height)
+    nuisance = around.nuisance(height, rise_of(beside))
     levels = []
     for share in MISFIT_SHARES:
         noise = with_waves(around.noise, share * height, half_width)

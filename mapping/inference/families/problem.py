@@ -72,16 +72,19 @@ class Surroundings:
     others: Sequence[Feature] = ()
     tip_sd: float = 0.0
 
-    def nuisance(self, height: float) -> Nuisance:
-        """What the base may do under each run of bins about a detail of a height (m).
+    def nuisance(self, height: float, rise: float = 0.0) -> Nuisance:
+        """What the base may do under each run of bins about a detail of a height (m), beside steps that rise (m).
 
         A base of several levels was fitted to them: what it leaves of a slope is noise. Were it free, it would stand
         for a step in the little of both levels that a window holds.
+        What a step leaves is told over its low side, and a run that is on its high one alone is felt over that: the
+        base under it lies as deep as the step rises.
         """
         vague = 3.0 * max(height, self.noise.sd)
+        offset = max(vague, 3.0 * rise)
         if len(self.base.levels) > 1:
-            return Nuisance(vague, self.noise.sd, self.noise.sd)
-        return Nuisance(vague, vague, 0.0 if self.base.kind == "mesh" else 0.3 * height)
+            return Nuisance(offset, self.noise.sd, self.noise.sd)
+        return Nuisance(offset, vague, 0.0 if self.base.kind == "mesh" else 0.3 * height)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,9 +120,10 @@ class PosteriorProblem:
         around: Surroundings,
         beginnings: FloatArray,
         beside: Beside | None,
+        rise: float,
     ) -> Self:
-        """With the noise of the surroundings, and what neighbours leave beside the feature."""
-        nuisance = around.nuisance(sizes.height)
+        """With the noise of the surroundings, and what neighbours leave beside the feature, steps of a rise (m) too."""
+        nuisance = around.nuisance(sizes.height, rise)
         likelihood = _likelihood(window, around.noise, nuisance, sizes.height, None)
         return cls(feature, sizes, LogPosterior(shape, likelihood, beside), around.noise, nuisance, beginnings)
 

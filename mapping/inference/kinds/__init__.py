@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         kind_made_of as kind_made_of,
         kind_named as kind_named,
         kind_of as kind_of,
+        rise_of as rise_of,
         sizes_of as sizes_of,
     )
     from mapping.inference.kinds.lines import (
@@ -42,6 +43,7 @@ _PUBLIC = {
         "kind_made_of",
         "kind_named",
         "kind_of",
+        "rise_of",
         "sizes_of",
     ),
     "lines": ("LineKind", "Parameters", "Traced"),

@@ -253,6 +253,11 @@ def feature_trace(feature: Feature, feet: FloatArray, normals: FloatArray, tip_r
     return kind_of(feature).trace(feature, feet, normals, tip_radius)
 
 
+def rise_of(features: Sequence[Feature]) -> float:
+    """Height of the highest step among features, m; 0 if none is one."""
+    return max((abs(feature.height.median) for feature in features if kind_of(feature).sided), default=0.0)
+
+
 def uphill(step: Feature, points: FloatArray) -> FloatArray:
     """(N,) distances of points (N, 3) from the edge of a step, to its high side, m; 0 where that is not known.
 

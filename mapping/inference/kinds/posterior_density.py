@@ -12,7 +12,7 @@ from mapping.geometry.mesh import arclengths, nearest_on
 from mapping.geometry.templates import contact_half_width
 from mapping.inference.curves import Chart, CurveModes, chart_along
 from mapping.inference.families import GrooveShape, PosteriorProblem, Sizes, StepShape, Surroundings
-from mapping.inference.kinds.kind import feature_trace, kind_of, sizes_of, uphill
+from mapping.inference.kinds.kind import feature_trace, kind_of, rise_of, sizes_of, uphill
 from mapping.inference.likelihood import Beside, Prior, Shape, StudentT, Uniform, Window
 from mapping.instrument import FEATURE_RESIDUAL_SDS
 
@@ -40,7 +40,7 @@ def pose(
             else:
                 edges = [_edge_beside(feature, sizes, other, window, around) for other in near if kind_of(other).sided]
                 shape = replace(shape, crossed=grooves, edges=tuple(each for each in edges if each is not None))
-    return PosteriorProblem.posed(feature, sizes, shape, window, around, beginnings, beside)
+    return PosteriorProblem.posed(feature, sizes, shape, window, around, beginnings, beside, rise_of(near))
 
 
 def felt_beside(

@@ -103,3 +103,14 @@ def test_a_wire_stands_on_the_level_of_a_step_beside_it(side):
     found = refine(guess, trace, np.random.default_rng(0), base=plate(), noise=NOISE, others=[wall], confirm=None)
     assert found.details.misfit is None
     assert abs(found.height.median - 0.4e-3) < 4e-6
+
+
+def test_nothing_is_felt_beside_a_step_where_runs_see_its_high_level_alone():
+    """All that it adds to them is a height of the base; a pit that covers most of a run would stand for it, too."""
+    wall = feature("step", np.array([[0.0, -9e-3, 0.0], [0.0, 9e-3, 0.0]]), 2e-3, 0.0, 10)
+    wall = replace(wall, details=replace(wall.details, high_side=-1.0))  # x > 0
+    base = replace(plate(), parameters={"levels": [0.0, 2e-3]})
+    trace = record([line((-15e-3, 0.0), (18e-3, 0.0), 1e-3)], lambda feet: step_height(feet[:, 0], 2e-3, TIP), NOISE, 1)
+    guess = feature("pit", np.array([[9e-3, 0.0, 0.0]]), -0.05e-3, 1e-3, 1)
+    found = refine(guess, trace, np.random.default_rng(0), base=base, noise=NOISE, others=[wall], confirm=None)
+    assert found.evidence.log_odds < 0.0
