@@ -99,11 +99,13 @@ class EndFinder:
         """
         half, enough = self._half(crest), np.array(wanted)
         about = _Course.about(self.strokes, end, half, half)
+        # of an end that no slide showed it is known as far as where the crest was gone
+        along_sd = end.sd if np.isfinite(end.sd) else max(end.reach, half)
         place = EndPlace(
             self._section(end, crest, half, about),
             self.noise,
             np.array([0.0, 0.0, 0.0, crest.height]),
-            np.array([end.sd, half, UNKNOWN_TURN, crest.height_sd]),
+            np.array([along_sd, half, UNKNOWN_TURN, crest.height_sd]),
         )
         here, made, useless = 0.0, 0, set[float]()
         while made < MOST_PASSES and place.fits and (place.sd[:2] > enough).any():
@@ -127,7 +129,8 @@ class EndFinder:
             place.solve()
         along, across, _, height = place.place
         known = bool((place.sd[:2] <= enough).all())
-        if not (place.fits or known) or max(abs(along), abs(across)) > half or height < 0.4 * crest.height:
+        shown = place.felt and (place.fits or known)
+        if not shown or max(abs(along), abs(across)) > half or height < 0.4 * crest.height:
             return end
         where, heading = about.at(along)
         point = self.strokes.onto(where + across * np.cross(self.strokes.onto(where)[1], heading))[0]

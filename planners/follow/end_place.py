@@ -102,6 +102,11 @@ class EndPlace:
         known = 1.0 / np.maximum(self.sd, 1e-6 * np.array([*2 * [self.section.half_width], 1.0, self.place[3]]))
         self._before, self._told = (self.place, known), np.diag(known**2)
 
+    @property
+    def felt(self) -> bool:
+        """True if any pass told of it."""
+        return bool(self._felt)
+
     def sweeps(self, spacing: float) -> list[Across]:
         """All sweeps that could be made, with samples so far apart, m; what each tells, by what is known by now."""
         half_width, made = self.section.half_width, []

@@ -98,6 +98,20 @@ def test_a_slide_that_feels_nothing_leaves_the_end_as_it_was() -> None:
     assert done.value.value is end
 
 
+def test_an_end_that_no_slide_showed_is_found_by_sweeps_across() -> None:
+    rough = AxisEnd(END - [0.8e-3, 0.0, 0.0], np.inf, "end", WAY, reach=2e-3)
+    ends = [found(rough, seed)[0] for seed in range(4)]
+    assert max(end.sd for end in ends) <= WANTED[0]
+    # eight draws: the standard error of their standard deviation is 0.25
+    assert np.std([(end.point - END)[:2] / [end.sd, end.across_sd] for end in ends]) < 1.8
+
+
+def test_sweeps_across_that_feel_nothing_leave_the_end_as_it_was() -> None:
+    for sd in (1e-4, np.inf):
+        end = AxisEnd(END, sd, "end", WAY)
+        assert found(end, seed=1, pecks=1)[0] is end
+
+
 def test_whether_an_end_is_round_leaves_the_place_of_a_wire_open_by_a_fiftieth_of_a_millimetre() -> None:
     # laid over each other, the traces over a round and over a square end are shifted by 0.045 mm
     assert 0.35 * 0.7 < Crest(WIRE, 5e-6, WIDE, 1.0).rounding_sd(R) / 0.045e-3 < 0.35 * 1.3
