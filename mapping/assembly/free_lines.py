@@ -40,8 +40,8 @@ UNIFORM_HALF_90 = 0.45
 def free_lines(
     sections: Sequence[FreeSection], detections: Detections, trace: LaidTrace
 ) -> tuple[list[Feature], list[FreeSection]]:
-    """The ridges, grooves, bumps and pits that the sections of several sweeps are of, and the sections that are wide
-    only because their sweeps run at a slant to a line.
+    """The ridges, grooves, bumps and pits that the sections of several sweeps are of, and the sections that are of
+    none: wide because their sweeps run at a slant to a line, or over several of them at once.
 
     Reference: theory section 5.4.
     """
@@ -95,7 +95,8 @@ def _gone_on(feature: Feature, point: FloatArray) -> FloatArray:
 def _of_group(
     group: list[FreeSection], inspection: Inspection, detections: Detections, trace: LaidTrace
 ) -> tuple[list[Feature], list[FreeSection]]:
-    """The spot, or the lines, that linked sections are of; and those of them that across their line are not wide."""
+    """The spot, or the lines, that linked sections are of; and those of them that are of no line, or not wide across
+    it."""
     highest = max(group, key=lambda section: abs(section.crossing.height))
     points = np.array([section.crossing.point for section in group])
     # a round spot is felt as far across the sweeps as along them, wider than it is by what the ball adds to either side
@@ -112,6 +113,8 @@ def _of_group(
     # a row that was swept to and fro crosses twice in one place
     places = np.array([mean_point(each) for each in merged([s.crossing for s in group], ONE_POINT * half_width)])
     lines = [line for line in branches(places, half_width) if len(line.axis) > 1]
+    if not lines:  # of lines nearer to one another than their sections are wide no middle need lie on one
+        return [], group
     apart = np.array([distances(points, line.axis) for line in lines])
     found, slanted = list[Feature](), list[FreeSection]()
     for number, line in enumerate(lines):
