@@ -99,7 +99,10 @@ def between_walls(line: FloatArray, normals: FloatArray, base: Base, tip_radius:
         base: the global model.
         tip_radius: radius of the fingertip, m.
     """
-    up, middle, count = base.foot(line + tip_radius * normals, tip_radius).normals, len(line) // 2, len(line)
+    middle, count = len(line) // 2, len(line)
+    if 2.0 * np.arccos(np.clip((base.surface.face_normals @ normals[0]).min(), -1.0, 1.0)) < np.arccos(WALL_COSINE):
+        return slice(0, count)  # no two faces of it are turned so far from each other
+    up = base.foot(line + tip_radius * normals, tip_radius).normals
     # as the base lies under the place before it, seen from the middle: a line that was led on to a wall stands on it
     before = np.clip(np.where(np.arange(count) < middle, np.arange(count) + 1, np.arange(count) - 1), 0, count - 1)
     feet = base.foot(line + tip_radius * up[before], tip_radius)

@@ -63,7 +63,8 @@ def test_roughness_lays_nothing_that_is_laid_already(monkeypatch):
 
 @pytest.mark.slow
 def test_what_is_measured_for_roughness_too_is_laid_sample_by_sample_once_its_pictures_included(laid, tmp_path):
-    trace = scaled(sweeps(wire(), white=0.02e-3, spacing=10e-6, half=80e-3), 0.5)
+    # the courses of what is found are laid out on some 4,300 places, however many samples there are
+    trace = scaled(sweeps(wire(), white=0.02e-3, spacing=8e-6, half=80e-3), 0.5)
     assert len(trace) > RAW_SAMPLES
     felt = replace(plate(at=(0.0, 0.0, 0.1e-3)), kind="plane")  # by few sweeps, and not quite where it is
     analysis = build_model(Log(trace), None, felt, Stages())

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from mapping import Surface, Trace
+from mapping import FloatArray, Surface, Trace
 from mapping.base import Base, LaidTrace, between_walls, on_walls
 from mapping.inference.curves import chart_along
 from mapping.inference.likelihood import gather
@@ -41,6 +42,17 @@ def test_a_line_ends_where_a_ball_on_it_meets_the_wall_that_it_runs_into() -> No
     assert np.array_equal(turned[::-1], kept)
     edge = line[between_walls(line, np.tile(UP, (71, 1)), corner(-30e-3), TIP)]
     assert np.array_equal(edge, line)
+
+
+def test_on_a_base_that_turns_by_less_than_a_wall_nothing_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(self: Base, centers: FloatArray, tip_radius: float) -> None:
+        raise AssertionError(f"{len(centers)} places are laid on it")
+
+    monkeypatch.setattr(Base, "foot", refused)
+    roof = Surface(np.array([[0, 0, 0], [0, 1, 0], [1, 0, 0.3], [1, 1, 0.3], [2, 0, 0], [2, 1, 0]]) * 1e-2,
+                   [[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5]])  # fmt: skip
+    line = np.linspace([0, 5e-3, 0], [20e-3, 5e-3, 0], 30)
+    assert between_walls(line, np.tile(UP, (30, 1)), Base(roof), TIP) == slice(0, 30)
 
 
 def test_a_chart_does_not_climb_the_wall() -> None:
