@@ -69,6 +69,8 @@ ENDS_ROUNDS = 3
 # Share of the sweeps' ends that lie on one plane, at least, where all of them do: of two sides of an edge each may have
 # up to nine tenths, and one in ten ends may be on a detail
 ALL_ENDS = 0.9
+# Share of the sweeps' ends that a base between details holds, more than: what the sum of absolute residuals finds
+MOST_ENDS = 0.5
 # Families that a form admits over an area
 AREAL_FORMS: dict[str, tuple[Family, ...]] = {
     "auto": (*FAMILIES, terraced_plane, terraced_quadric),
@@ -128,17 +130,23 @@ def fit_base(
             fits += [body for body in bodies if not _walked_through(body, cloud, trace)]
         if _unexplained(fits, cloud):
             fits += _last_resort(FREE, cloud)
-    residual = min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual
-    scale, share = _noise_of(residual, cloud)
-    alone = _alone(residual, cloud) if all(_missed(fit, cloud) > EXPLAINED for fit in fits) else None
+    missed_by_all = all(_missed(fit, cloud) > EXPLAINED for fit in fits)
+    through_ends = _of_ends(cloud) if missed_by_all else []
+    fits += [fit for fit in through_ends if _holds_ends(fit, cloud)]
+    nearest = min(fits, key=lambda fitted: fitted.cost(cloud.floor))
+    # the details of a crowded plate take most of its path: what lies on them is no noise of the base between them
+    on_base = np.abs(nearest.residual) < FEATURE_RESIDUAL_SDS * cloud.floor
+    on_base |= nearest not in through_ends
+    scale, share = _noise_of(nearest.residual[on_base], cloud.sweep[on_base], cloud.floor)
+    alone = _alone(nearest.residual, cloud) if missed_by_all and nearest not in through_ends else None
     if alone is not None:
         # most of the path may lie on one detail, and what all sweeps miss there counts as one sweep's
-        own, of_own = _noise_of(alone, cloud)
+        own, of_own = _noise_of(alone, cloud.sweep, cloud.floor)
         if all(np.median(np.abs(fit.residual)) > EXPLAINED * own for fit in fits):
-            fits += _of_ends(cloud)
+            fits += through_ends
             scale, share = own, of_own / len(np.unique(cloud.sweep))
     best = min(fits, key=lambda fitted: fitted.cost(scale, share))
-    missed = _foretold(best, trace) if tested else None
+    missed = _foretold(best, trace, best in through_ends) if tested else None
     return Base(best.surface(cloud, spacing), best.kind, best.parameters, missed=missed)
 
 
@@ -158,11 +166,11 @@ def _walked_through(body: Fitted, cloud: Cloud, trace: Trace) -> bool:
     return bool(len(through) > MOST_WALKED * len(np.unique(trace.sweep)))
 
 
-def _foretold(best: Fitted, trace: Trace) -> float | None:
+def _foretold(best: Fitted, trace: Trace, through_ends: bool) -> float | None:
     """By how much a simple body fitted to every other sweep misses those between, m, if that is no more than noise.
 
     None if it misses them by more, as where noise wanders or the body is none of these, and of free bodies, which
-    follow what they are fitted to.
+    follow what they are fitted to. A base that the ends of the sweeps tell is asked of the ends of the others.
     """
     family = SIMPLE.get(best.kind)
     numbers = np.unique(trace.sweep)
@@ -170,19 +178,21 @@ def _foretold(best: Fitted, trace: Trace) -> float | None:
         return None
     half = np.isin(trace.sweep, numbers[::2])
     cloud = Cloud.of(trace.select(half), MOST_BASE_CELLS)
-    fits = _fits(family, cloud)
+    fits = [fit for fit in _of_ends(cloud) if fit.kind == best.kind] if through_ends else _fits(family, cloud)
     if not fits:
         return None
     fit = min(fits, key=lambda fitted: fitted.cost(cloud.floor))
     others = Cells.of(trace.select(~half), MOST_BASE_CELLS)
+    asked = _ends(others.sweep) if through_ends else np.ones(len(others.sweep), dtype=bool)
+    centers, sweep = others.centers[asked], others.sweep[asked]
     base = Base(fit.surface(cloud, None), fit.kind, fit.parameters)
-    missed, scatter = base.misses(others.centers, trace.tip_radius)
+    missed, scatter = base.misses(centers, trace.tip_radius)
     if missed > FORETOLD * scatter:
         return None
     # nor by more as a whole sweep than so many times what its cells make of that
-    over = base.foot(others.centers, trace.tip_radius).height[:, None] - base.levels
+    over = base.foot(centers, trace.tip_radius).height[:, None] - base.levels
     height = over[np.arange(len(over)), np.abs(over).argmin(axis=1)]
-    alike, apart = _shares(height, others.sweep, max(scatter, cloud.floor))
+    alike, apart = _shares(height, sweep, max(scatter, cloud.floor))
     return missed if apart >= alike / FORETOLD**2 else None
 
 
@@ -204,16 +214,17 @@ def _unexplained(fits: Iterable[Fitted], cloud: Cloud) -> bool:
     return all(_missed(fit, cloud) > EXACTLY for fit in fits if fit.explains)
 
 
-def _noise_of(residual: FloatArray, cloud: Cloud) -> tuple[float, float]:
-    """Scale of the cells' scatter about the freest fit, m, and the share of them that count as independent.
+def _noise_of(residual: FloatArray, sweep: IntArray, floor: float) -> tuple[float, float]:
+    """Scale of the scatter of cells (C,) of some sweeps (C,) about the freest fit, m, and the share of them that count
+    as independent; the scale is no less than half of `floor`, m.
 
     Noise that is correlated along the path makes neighbours agree: by the scatter from cell to cell alone, a
     plane would be bent to follow it. So it would be by sweeps that stand off each other as a whole: as many count as
     their medians scatter like those of.
     """
     # the scatter from cell to cell is too large where sweeps are short and bend over features
-    scale = max(0.5 * cloud.floor, robust_scale(residual))
-    return scale, min(_independent(residual / scale), _shares(residual, cloud.sweep, scale)[1])
+    scale = max(0.5 * floor, robust_scale(residual))
+    return scale, min(_independent(residual / scale), _shares(residual, sweep, scale)[1])
 
 
 def _independent(residual: FloatArray) -> float:
@@ -269,6 +280,12 @@ def _ends_in_a_plane(cloud: Cloud) -> bool:
     ends = _ends(cloud.sweep)
     fit = height_field(plane_design, "plane", cloud, among=ends)
     return bool(np.mean(np.abs(fit.residual[ends]) < FEATURE_RESIDUAL_SDS * cloud.floor) > ALL_ENDS)
+
+
+def _holds_ends(fit: Fitted, cloud: Cloud) -> bool:
+    """True if most of the sweeps' ends lie on a base: as many as tell it against details that the others end on."""
+    off = np.abs(fit.residual[_ends(cloud.sweep)])
+    return bool(np.mean(off < FEATURE_RESIDUAL_SDS * cloud.floor) > MOST_ENDS)
 
 
 def _ends(sweep: IntArray) -> BoolArray:
