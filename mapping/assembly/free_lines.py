@@ -56,11 +56,19 @@ def free_lines(
             own = list[Feature]()
             for members in sorted(linked, key=len, reverse=True):  # what ends a line is found with it
                 group = [alike[k] for k in members]
-                if not any(lies_on(section.crossing, line) for line in own for section in group):
+                if not any(_is_of(section, line) for line in own for section in group):
                     lines, not_wide = _of_group(group, inspection, detections, trace)
                     own, slanted = [*own, *lines], [*slanted, *not_wide]
             found += own
     return found, slanted
+
+
+def _is_of(section: FreeSection, feature: Feature) -> bool:
+    """True of a section that is another piece of a line, as at its end, or whose middle lies on a spot."""
+    if len(feature.axis) > 1:
+        return lies_on(section.crossing, feature)
+    away = float(np.linalg.norm(section.crossing.point - feature.axis[0]))
+    return away < 0.5 * feature.width.high
 
 
 def lies_on(crossing: Crossing, feature: Feature, inspection: Inspection | None = None) -> bool:
@@ -108,7 +116,11 @@ def _of_group(
         if not _is_wide(_through(points, CORE * highest.sizes.width), group):
             return [], group
         spot = free_spot(_between_sweeps(highest, group), detections.algorithm)
-        return [replace(spot, evidence=_evidence(group, detections.algorithm))], []
+        # a flat top is as high on all its sweeps: the highest may be any of them, the middle lies amid all
+        middle = np.average(points, axis=0, weights=[abs(section.crossing.height) for section in group])
+        foot = trace.base.foot((middle + trace.tip_radius * spot.normals[0])[None], trace.tip_radius)
+        evidence = _evidence(group, detections.algorithm)
+        return [replace(spot, axis=foot.points, normals=foot.normals, evidence=evidence)], []
     half_width = 0.5 * float(np.median([section.sizes.width for section in group]))
     # a row that was swept to and fro crosses twice in one place
     places = np.array([mean_point(each) for each in merged([s.crossing for s in group], ONE_POINT * half_width)])
@@ -129,8 +141,11 @@ def _of_group(
 def _is_long(highest: FreeSection, group: Sequence[FreeSection], inspection: Inspection) -> bool:
     """True of sections that are of no spot but of what runs along their sweeps: what is as wide across its sweeps as
     along them is felt half as high by all that pass within that, but for one to either side."""
-    high = {each.crossing.sweep for each in group if each.sizes.height > 0.5 * highest.sizes.height}
-    places = inspection.near(highest.crossing.point[None], 0.5 * highest.half_extent)
+    whole = [each.crossing for each in group if each.sizes.height > 0.5 * highest.sizes.height]
+    high = {crossing.sweep for crossing in whole}
+    # the highest of a flat top may be any of its sweeps, and lie at its rim
+    middle = np.mean([crossing.point for crossing in whole], axis=0)
+    places = inspection.near(middle[None], 0.5 * highest.half_extent)
     return len(high.union(inspection.sweep[places].tolist())) > len(high) + 2
 
 

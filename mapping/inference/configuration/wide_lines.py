@@ -20,7 +20,7 @@ def is_two(line: Feature, places: Places, around: Surroundings, false_alarms_per
         around: trace, base and noise.
         false_alarms_per_metre: accepted rate of invented features, 1/m of path.
     """
-    if kind_of(line).sign < 0 or line.closed:
+    if not kind_of(line).line or kind_of(line).sign < 0 or line.closed:
         return False
     place = neighbourhood([line], [], places, around, false_alarms_per_metre)
     if place is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from mapping.assembly.free import free_sections
 from mapping.assembly.free.mean_section import mean_sizes
 from mapping.base import LaidTrace, fit_base
 from mapping.detection import detect
-from mapping.geometry.templates.shapes import cap_height
+from mapping.geometry.templates.shapes import cap_height, step_height
 from mapping.inference.joint import refine_all
 
 TIP, FINE, SAMPLING, PITCH = 2e-6, 0.125e-6, 8, 15e-6
@@ -157,14 +158,19 @@ def test_a_bare_raster_holds_nothing_wide() -> None:
     assert not felt(lambda x, _: 0.0 * x, 14, 60e-9)
 
 
-def assembled(height: Callable[[FloatArray, FloatArray], FloatArray], rows: FloatArray) -> list[Feature]:
-    """What rows of a ball of 1 mm assemble to, whose centre is by so much higher than its radius."""
+def assembled(
+    height: Callable[[FloatArray, FloatArray], FloatArray], rows: FloatArray, *, level: bool = False
+) -> list[Feature]:
+    """What rows of a ball of 1 mm assemble to, whose centre is by so much higher than its radius; over a base of one
+    `level` if that is asked for."""
     x = np.arange(-13e-3, 13e-3, 0.1e-3)
     feet = np.concatenate([np.column_stack([x[:: 1 - 2 * (k % 2)], np.full(len(x), y)]) for k, y in enumerate(rows)])
     z = height(*feet.T) + 3e-6 * np.random.default_rng(7).standard_normal(len(feet))
     sweep = np.repeat(np.arange(len(rows)), len(x))
     raster = Trace(1e-2 * np.arange(len(feet)), np.column_stack([feet, 1e-3 + z]), sweep, 1e-3)
     base = fit_base(raster)
+    if level:
+        base = replace(base, parameters={key: own for key, own in base.parameters.items() if key != "levels"})
     return list(assemble(detect(raster, base), raster, base))
 
 
@@ -179,6 +185,19 @@ def test_rivets_are_bumps_wherever_the_rows_pass() -> None:
 
     found = assembled(rivets, np.arange(-12.83e-3, 13e-3, 0.5e-3))
     assert [feature.kind for feature in found] == ["bump"] * 4
+
+
+def test_keys_are_bumps_in_their_middles_whichever_row_is_the_highest() -> None:
+    # on a flat top it is any of them by noise: at its rim, half of what lies about it seems to be no key
+    def keys(x: FloatArray, y: FloatArray) -> FloatArray:
+        away = np.min([np.maximum(abs(x - at), abs(y - 1e-3)) for at in (-5e-3, 0.0, 5e-3)], axis=0)
+        return step_height(1.5e-3 - away, 0.25e-3, 1e-3)
+
+    found = assembled(keys, np.arange(-12.83e-3, 13e-3, 0.5e-3), level=True)
+    assert [feature.kind for feature in found] == ["bump"] * 3
+    middles = np.sort([feature.axis[0, 0] for feature in found])
+    assert middles == pytest.approx([-5e-3, 0.0, 5e-3], abs=0.1e-3)
+    assert [feature.axis[0, 1] for feature in found] == pytest.approx([1e-3] * 3, abs=0.25e-3)
 
 
 def test_a_dent_a_quarter_as_long_as_the_rows_is_one_pit() -> None:
