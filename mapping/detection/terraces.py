@@ -152,7 +152,8 @@ def _runs(level: IntArray, on: BoolArray, shortest: float, passed: int) -> list[
     """(first bin, past-last bin, level) of the stretches on one level; details interrupt none of them.
 
     What is no longer than `shortest` is a detail of the level on both its sides, unless these are two: then it is a
-    stair, if it is longer than what is `passed` on the way from one to the other.
+    stair, if it is longer than what is `passed` on the way from one to the other. So is what a sweep begins or ends on,
+    of which there is no other side.
     """
     at = np.flatnonzero(on)
     if not len(at):
@@ -172,6 +173,10 @@ def _runs(level: IntArray, on: BoolArray, shortest: float, passed: int) -> list[
         for piece in pieces
         if end <= piece[0] and piece[1] <= onward and piece[1] - piece[0] > passed and piece[2] not in (here, there)
     ]
+    # where it went on to another level soon after it began, or soon before it ended
+    begun = [pieces[0]] if runs and pieces[0][1] <= runs[0][0] and pieces[0][2] != runs[0][2] else []
+    ended = [pieces[-1]] if runs and runs[-1][1] <= pieces[-1][0] and pieces[-1][2] != runs[-1][2] else []
+    stairs += [piece for piece in (*begun, *ended) if piece[1] - piece[0] > passed]
     return sorted([*runs, *stairs])
 
 

@@ -52,6 +52,14 @@ def test_every_line_crosses_the_step_and_nothing_else(height: float) -> None:
         assert crossing.height == pytest.approx(height, rel=0.02)
 
 
+def test_a_line_that_begins_and_ends_soon_beyond_a_block_crosses_its_edges() -> None:
+    """Two radii of the table at either end were too short for a level: hollows at the lines' ends, and no edges."""
+    detections = found(lambda x: step_height(28e-3 - abs(x), 0.3e-3, TIP))
+    for line in places(detections, "step up", "step down"):
+        assert line == pytest.approx([-28e-3, 28e-3], abs=0.2e-3)
+    assert len(detections.crossings) == 2 * LINES
+
+
 @pytest.mark.slow
 def test_each_edge_of_a_staircase_is_crossed() -> None:
     stairs = (-15e-3, -2e-3, 17e-3)
