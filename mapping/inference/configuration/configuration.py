@@ -52,6 +52,9 @@ PLACE_OPEN = 1.5
 NO_HEIGHT = 1e-12
 # The level of misfit is chosen again where the optimum under the first one says another
 MOST_LEVEL_CHANGES = 3
+# Share of its height that is felt of a crest which is proposed: between two rows as far apart as its half-width it is
+# felt by three quarters, 1 - (1/2)^2
+FELT_TOP = 0.5
 # Half-widths beside the axis of a groove within which the ball is about as deep as on it: where it hangs between two
 # rims it is 1 - (1 - 0.25)^2 = 0.44 of the depth higher at the border of that, 0.23 in the median
 ON_AXIS = 0.25
@@ -128,6 +131,14 @@ class Configuration:
         """
         twins = [part for part in self.parts if isinstance(part.shape, TwinShape) and not part.shape.lying]
         return all(_gap_strength(part, self.place) > SINKS_SDS for part in twins)
+
+    @property
+    def tops_are_felt(self) -> bool:
+        """True if every crest is at most so high that half of it was felt: what the base may do under each run stands
+        for most of a ball of any size, and what it leaves of that follows any slope."""
+        crests = [part for part in self.parts if stands_out(part.shape)]
+        highest = max((part.start[part.shape.names.index("height")] for part in crests), default=0.0)
+        return bool(np.ptp(self.place.window.height) >= FELT_TOP * highest)
 
     def strength(self, k: int) -> float:
         """Signal-to-noise ratio of the k-th part alone, over the bare base."""
@@ -334,8 +345,8 @@ def laid(parts: Sequence[Part], place: Neighbourhood) -> Configuration:
 
 
 def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | None = None) -> Configuration | None:
-    """The configuration of these parts at the optimum of all of them together; None if a rival is far better,
-    or what it calls two details is felt as one."""
+    """The configuration of these parts at the optimum of all of them together; None if a rival is far better, if what
+    it calls two details is felt as one, or if it would do instead of a rival by more than was felt."""
     shape = place.joined([part.shape for part in parts])
     theta = np.concatenate([np.zeros(0), *(part.start for part in parts)])
     constants = np.array([constant for _, constant in place.levels])
@@ -367,7 +378,7 @@ def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | N
     prior = sum(_log_prior(part, place) for part in parts)
     odds = evidence + float(constants[level]) - float(np.log(len(constants))) + plain + prior
     whole = Configuration(moved, place, found, level, float(odds), deviation)
-    return whole if whole.gaps_are_felt else None
+    return whole if whole.gaps_are_felt and (rival is None or whole.tops_are_felt) else None
 
 
 def _gap_strength(twin: Part, place: Neighbourhood) -> float:

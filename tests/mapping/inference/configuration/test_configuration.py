@@ -207,6 +207,19 @@ def test_a_line_laid_as_it_was_felt_is_asked_for_fewer_bends() -> None:
     assert len(best.shape.names) < len(start.shape.names)
 
 
+def test_no_crest_is_proposed_that_is_twice_as_high_as_anything_was_felt() -> None:
+    """Without what the base may do under each run, a ball of any size leaves as little as a slope."""
+    wires = [_true(each) for each in classified_body("wires 2 mm apart", FIRST_BUILT_WITH).truth]
+    place = _weighed_on("wires 2 mm apart", wires)
+    parts = [part_of(wire, place) for wire in wires]
+    assert laid(parts, place).tops_are_felt
+    at, highest = parts[0].shape.names.index("height"), float(np.ptp(place.window.height))
+    for share, felt in ((1.9, True), (2.1, False)):
+        start = parts[0].start.copy()
+        start[at] = share * highest
+        assert laid([replace(parts[0], start=start), *parts[1:]], place).tops_are_felt == felt
+
+
 def test_pieces_of_a_line_are_joined_with_their_section() -> None:
     body = "burred groove"
     groove = next(_true(true) for true in classified_body(body, FIRST_BUILT_WITH).truth if true.kind == "groove")
