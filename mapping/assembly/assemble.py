@@ -106,7 +106,9 @@ def assemble(
     if features and spacing is not None and proposals:
         places = _places(inspections.at(spacing))
         alone = [feature for feature in wide if len(feature.axis) == 1 and feature.evidence.crossings == 1]
-        features, left = accounted(features, crossings, places, around, false_alarms_per_metre, proposals, alone)
+        features, left = accounted(
+            features, crossings, places, around, false_alarms_per_metre, proposals, alone, measured=wide
+        )
         wide = [feature for feature in wide if feature not in alone or feature in left]
     if faint:
         features = with_faint_lines(features, detections, laid, base, false_alarms_per_metre, inspections)

@@ -74,6 +74,7 @@ def accounted(
     false_alarms_per_metre: float,
     proposals: Sequence[Proposal] = PROPOSALS,
     alone: Sequence[Feature] = (),
+    measured: Sequence[Feature] = (),
 ) -> tuple[list[Feature], list[Feature]]:
     """The features of the configurations of highest evidence, and what of `alone` these do not explain; features of a
     neighbourhood that no proposal improves are returned as they are, with what else they may be.
@@ -86,7 +87,9 @@ def accounted(
         false_alarms_per_metre: accepted rate of invented features, 1/m of path.
         proposals: what is tried.
         alone: spots that a single sweep shows, as where lines cross one does that runs over both at once.
+        measured: wide lines whose sizes are known: they are held beside what they reach into.
     """
+    bars = [line for line in measured if kind_of(line).line and line.details.top]
     rest, left = [feature for feature in features if not _weighed(feature)], list(alone)
     tip = around.trace.tip_radius
     open_to = [c for c in crossings if not any(_felt_by(c, feature, tip) for feature in rest)]
@@ -105,13 +108,13 @@ def accounted(
         weighed = [block for block in blocks if not again or met & block.origins]
         for _ in range(LAID_ROUNDS):
             for block in weighed:
-                _lay(block, _beside(block, blocks, tip), places, around, false_alarms_per_metre)
+                _lay(block, _beside(block, blocks, bars, tip), places, around, false_alarms_per_metre)
                 if block.laid and len(blocks) > 1:
                     block.felt = _described(block.laid[1], around)
         for block in weighed:
             block.explained = block.understood and (block.laid is None or block.laid[1].fits)
         for block in weighed:
-            _lay(block, _beside(block, blocks, tip, explained=True), places, around, false_alarms_per_metre)
+            _lay(block, _beside(block, blocks, bars, tip, explained=True), places, around, false_alarms_per_metre)
             if block.laid is None:
                 continue
             improved, best = _improved(block, *block.laid, around, proposals)
@@ -151,12 +154,15 @@ class _Block:
     laid: tuple[list[Part], Configuration] | None = None
 
 
-def _beside(block: _Block, blocks: Sequence[_Block], tip: float, *, explained: bool = False) -> list[Feature]:
-    """What of the other blocks disturbs places that a block is weighed on.
+def _beside(
+    block: _Block, blocks: Sequence[_Block], bars: Sequence[Feature], tip: float, *, explained: bool = False
+) -> list[Feature]:
+    """What of the other blocks, and of bars that are measured, disturbs places that a block is weighed on.
 
     Args:
         block: the one.
         blocks: all of them.
+        bars: wide lines, as they are.
         tip: radius, m.
         explained: True for those alone that leave no more than noise, and those of the same crowd. What is not
             understood itself, as a ridge laid over both rims of a groove, hides what lies between it and others.
@@ -164,7 +170,7 @@ def _beside(block: _Block, blocks: Sequence[_Block], tip: float, *, explained: b
     others = [other for other in blocks if other is not block]
     if explained:
         others = [other for other in others if other.explained or (other.cut and other.origins == block.origins)]
-    felt = [feature for other in others for feature in other.felt or other.features]
+    felt = [*(feature for other in others for feature in other.felt or other.features), *bars]
     return [feature for feature in felt if _reaches_into(feature, block, tip)]
 
 
@@ -301,7 +307,7 @@ def _holding(beside: Sequence[Feature], place: Neighbourhood) -> Neighbourhood:
     held = []
     for feature in beside:
         try:
-            held.append(part_of(feature, place))
+            held.append(_begun(feature, place) if feature.details.free_section else part_of(feature, place))
         except MappingError:
             continue
     theirs = np.concatenate([np.zeros(0), *(part.start for part in held)])

@@ -22,7 +22,15 @@ from mapping.assembly import assemble
 from mapping.base import Base, LaidTrace
 from mapping.detection import detect
 from mapping.inference.configuration import Places, in_words, numbers_in, share_as_told
-from mapping.inference.configuration.account import ENDED_EARLY, IN_BLOCKS, NOT_WEIGHED, accounted
+from mapping.inference.configuration.account import (
+    ENDED_EARLY,
+    IN_BLOCKS,
+    NOT_WEIGHED,
+    _beside,
+    _Block,
+    _holding,
+    accounted,
+)
 from mapping.inference.configuration.configuration import (
     Configuration,
     Part,
@@ -218,6 +226,21 @@ def test_no_crest_is_proposed_that_is_twice_as_high_as_anything_was_felt() -> No
         start = parts[0].start.copy()
         start[at] = share * highest
         assert laid([replace(parts[0], start=start), *parts[1:]], place).tops_are_felt == felt
+
+
+def test_a_bar_that_is_measured_is_held_beside_what_it_reaches_into() -> None:
+    (true,) = classified_body("flat bar", FIRST_BUILT_WITH).truth
+    bar = _true(true)
+    bar = replace(bar, details=replace(bar.details, free_section=True, top=true.width))
+    place = _weighed_on("flat bar", [bar])
+    block = _Block([bar], [], frozenset())
+    tip = place.around.trace.tip_radius
+    assert _beside(block, [block], [bar], tip) == [bar]
+    left = [
+        float(np.abs(place.window.height - held.joined([]).templates(np.zeros((1, 0)))[0]).max())
+        for held in (place, _holding([bar], place))
+    ]
+    assert left[0] > 0.9 * true.height > 0.2 * true.height > left[1]
 
 
 def test_pieces_of_a_line_are_joined_with_their_section() -> None:
