@@ -179,8 +179,8 @@ def solve(
     # None of them fits: what the others would say is no better founded
     better = better_section(first, around, rng)
     if better is not None:
-        return solve_problem(better, rng, confirm=confirm)
-    return solve_problem(first, rng, confirm=confirm, adapt=False) if found is None else found
+        return solve_problem(better, rng, confirm=confirm, noise=noise)
+    return solve_problem(first, rng, confirm=confirm, adapt=False, noise=noise) if found is None else found
 
 
 def _rough(first: PosteriorProblem, around: Surroundings) -> list[PosteriorProblem]:
@@ -248,8 +248,12 @@ def _plain_odds(solution: Solution) -> float:
 
 def _pooled(solution: Solution, noise: Noise) -> PooledResidual:
     """What all crossings together say against the solved family, under the noise of the trace."""
-    problem = solution.problem if solution.problem.misfit == 0.0 else solution.problem.under(noise)
-    draws = solution.importance.draws[:: max(1, len(solution.importance.draws) // FEW_BEGINNINGS)]
+    return _pooled_by(solution.problem, solution.importance, noise)
+
+
+def _pooled_by(problem: PosteriorProblem, importance: Importance, noise: Noise) -> PooledResidual:
+    problem = problem if problem.misfit == 0.0 else problem.under(noise)
+    draws = importance.draws[:: max(1, len(importance.draws) // FEW_BEGINNINGS)]
     begin = draws[int(np.argmax(problem.target.log_density(draws)))]
     return pooled_residual(problem, find_optima(problem.target, begin[None])[0])
 
@@ -278,13 +282,15 @@ def _log_odds(problem: PosteriorProblem, importance: Importance) -> float:
     return importance.log_evidence - log_evidence_of_nothing(problem.target)
 
 
-def _hardly_spoken_for(problem: PosteriorProblem, importance: Importance) -> bool:
+def _hardly_spoken_for(problem: PosteriorProblem, importance: Importance, pooled: PooledResidual | None) -> bool:
     """True of what the evidence makes a false alarm: it is not told, and nobody asks how well its draws are known.
 
-    Under noise that was raised to the misfit existence is not judged.
+    Under noise that was raised to the misfit existence is judged by what all crossings together show, if that is known.
     """
-    evidence = replace(problem.feature.evidence, log_odds=_log_odds(problem, importance))
-    return problem.misfit == 0.0 and not evidence.likely
+    if problem.misfit > 0.0 and pooled is None:
+        return False
+    odds = max(_log_odds(problem, importance), -np.inf if pooled is None else pooled.log_odds)
+    return not replace(problem.feature.evidence, log_odds=odds).likely
 
 
 def pose_problem(feature: Feature, around: Surroundings) -> PosteriorProblem:
@@ -299,24 +305,33 @@ def pose_problem(feature: Feature, around: Surroundings) -> PosteriorProblem:
 
 
 def solve_problem(
-    problem: PosteriorProblem, rng: np.random.Generator, *, confirm: bool | None = True, adapt: bool = True
+    problem: PosteriorProblem,
+    rng: np.random.Generator,
+    *,
+    confirm: bool | None = True,
+    adapt: bool = True,
+    noise: Noise | None = None,
 ) -> Solution:
     """Optimum, misfit (unless `adapt` is False: the noise is known), importance sampling, and emcee where needed.
 
-    Unless it is asked for, no chain confirms what the evidence makes a false alarm.
+    Unless it is asked for, no chain confirms what the evidence makes a false alarm; of what no ideal shape fits that is
+    known under the noise of the trace, if it is given.
     """
     optima = find_optima(problem.target, problem.beginnings)
     if adapt:
         problem, optima = account_for_misfit(problem, optima)
     fast = importance_sample(problem.target, [laplace(problem.target, optimum) for optimum in optima], rng)
-    enough = fast.k_hat < TRUSTED_K_HAT or _hardly_spoken_for(problem, fast)
+    enough, pooled = fast.k_hat < TRUSTED_K_HAT, None
+    if confirm is False and not enough:
+        pooled = _pooled_by(problem, fast, noise) if noise is not None and problem.misfit > 0.0 else None
+        enough = _hardly_spoken_for(problem, fast, pooled)
     if confirm is None or (not confirm and enough):
-        return Solution(problem, _from_importance(problem, fast, rng), fast, None)
+        return Solution(problem, _from_importance(problem, fast, rng), fast, None, pooled=pooled)
     walkers = walkers_for(len(problem.window), fast.draws.shape[1])
     starts = _starts(problem, fast, rng, walkers)
     steps = steps_for(len(problem.window), walkers)
     chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal, max_steps=steps)
-    return Solution(problem, _from_chain(problem, fast, chain, rng), fast, chain)
+    return Solution(problem, _from_chain(problem, fast, chain, rng), fast, chain, pooled=pooled)
 
 
 def _starts(problem: PosteriorProblem, fast: Importance, rng: np.random.Generator, walkers: int) -> FloatArray:

@@ -27,7 +27,15 @@ from mapping.base.base import Base
 from mapping.base.projection import onto_base
 from mapping.feature import Details, Interval
 from mapping.geometry.templates.shapes import cap_height, groove_height, rim_height, step_height
-from mapping.inference.feature_posterior import Solution, _from_importance, refine, sample_posterior, solve
+from mapping.inference import feature_posterior
+from mapping.inference.feature_posterior import (
+    Solution,
+    _from_importance,
+    _hardly_spoken_for,
+    refine,
+    sample_posterior,
+    solve,
+)
 from mapping.inference.sampler.psis import resample
 from mapping.inference.summary import describe
 from mapping.instrument.noise import Noise
@@ -68,6 +76,15 @@ def test_the_fast_path_answers_alone_where_it_can_be_trusted():
     posterior = sample_posterior(GUESS, trace, np.random.default_rng(0), base=plate(), noise=WHITE, confirm=False)
     assert posterior.status == "not needed" and posterior.k_hat < 0.5
     assert np.isnan(posterior.tau) and posterior.ess > 500
+
+
+def test_under_noise_that_was_raised_to_a_misfit_all_crossings_together_say_whether_a_chain_is_worth_it(monkeypatch):
+    monkeypatch.setattr(feature_posterior, "_log_odds", lambda *_: -5.0)
+    fitting, misfitting = (SimpleNamespace(misfit=misfit, feature=GUESS) for misfit in (0.0, 9.0))
+    assert _hardly_spoken_for(fitting, None, None)
+    assert not _hardly_spoken_for(misfitting, None, None)
+    assert _hardly_spoken_for(misfitting, None, SimpleNamespace(log_odds=-4.0))
+    assert not _hardly_spoken_for(misfitting, None, SimpleNamespace(log_odds=40.0))
 
 
 def test_the_same_seed_gives_the_same_draws():
