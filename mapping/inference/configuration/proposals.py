@@ -400,7 +400,9 @@ def straight(now: Configuration, points: FloatArray) -> Iterator[Parts]:
         return
     near = np.min([distances(points, axis_of(line)) for line in lines], axis=0) < now.place.half_width
     found = straight_lines(points[near], ON_LINE * now.place.half_width)
-    if found:
+    # one straight line for another is the same: how far it goes where nobody looked is all that could differ
+    same = len(found) == len(lines) == 1 and isinstance(lines[0].shape, RidgeShape) and lines[0].shape.modes.degree == 1
+    if found and not same:
         model = max(lines, key=lambda part: part.feature.evidence.snr).feature
         rest = [part for part in now.parts if not any(part is line for line in lines)]
         yield [*rest, *(_line(model, line, now.place) for line in found)]

@@ -41,7 +41,7 @@ from mapping.inference.configuration.configuration import (
     part_of,
 )
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood, window_of
-from mapping.inference.configuration.proposals import as_point, chained, joined, smoother, straight_lines
+from mapping.inference.configuration.proposals import as_point, chained, joined, smoother, straight, straight_lines
 from mapping.inference.configuration.search import searched
 from mapping.inference.families import Crossing, SmoothGrooveShape, Surroundings
 from mapping.inference.joint import JoinedShape
@@ -213,6 +213,10 @@ def test_a_line_laid_as_it_was_felt_is_asked_for_fewer_bends() -> None:
     best = max(others, key=lambda other: other.log_odds)
     assert best.log_odds > start.log_odds + 5.0
     assert len(best.shape.names) < len(start.shape.names)
+    # a straight line is proposed for one that bends, and for a straight one none
+    points = np.linspace(bar.axis[0], bar.axis[-1], 9)
+    assert len(list(straight(start, points))) == 1
+    assert not list(straight(laid([part_of(bar, place)], place), points))
 
 
 def test_no_crest_is_proposed_that_is_twice_as_high_as_anything_was_felt() -> None:
