@@ -262,7 +262,8 @@ def _rehearsed(scene: Scene, planned: Explorer, base: Base, finger: SimulatedFin
     tip, ridges_only = scene.tip.radius, scene.survey.shortest_ridge
     height = REHEARSED_HEIGHT * scene.smallest
     length = max(ridges_only or REHEARSED_LENGTH * tip, REHEARSED_WIDTH * height)
-    wire = trimesh.creation.capsule(height=length - height, radius=0.5 * height)
+    # in heights, for vertices nearer than 10 nm are taken for one
+    wire = trimesh.creation.capsule(height=length / height - 1.0, radius=0.5).apply_scale(height)
     wire.apply_translation([0.0, 0.0, 0.5 * height] - wire.bounds.mean(axis=0))
     wire.apply_transform(rotation_matrix(0.5 * np.pi, [0, 1, 0], [0, 0, 0.5 * height]))
     wire.apply_transform(rotation_matrix(REHEARSED_TURN, [0, 0, 1]))

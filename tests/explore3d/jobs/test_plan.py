@@ -302,6 +302,14 @@ def test_a_budget_that_ends_the_survey_is_said_first_with_what_it_would_take(tmp
 
 
 @pytest.mark.slow
+def test_a_feature_that_is_asked_for_far_too_small_is_planned_for_all_the_same(tmp_path: Path) -> None:
+    """Of a wire of half a micrometre every vertex of its round end lay within what is taken for one."""
+    text = TEXT.replace('smallest_feature = "0.3 mm"', 'smallest_feature = "0.3 um"')
+    plan = planned(tmp_path, text.replace('time_budget = "10 min"', 'time_budget = "5 min"'))
+    assert plan.detail is None and "take about 2 h" in plan.stopped
+
+
+@pytest.mark.slow
 def test_of_many_moves_that_break_a_limit_some_are_told(tmp_path: Path) -> None:
     plan = planned(tmp_path, TEXT.replace('time_budget = "10 min"', 'time_budget = "20 s"'))
     many = replace(plan, violations=tuple((number, "too far") for number in range(1, 15)))
