@@ -718,16 +718,22 @@ def believed(work: Work, share: Share) -> None:
         work.features = tuple(_doubted(feature, work.backlash, tip) for feature in work.features)
     if work.yielding is not None:
         work.features = tuple(_pressed(feature, work.yielding, work.laid) for feature in work.features)
-    work.features = tuple(_on_sheet(feature, work) for feature in work.features)
 
 
-def _on_sheet(feature: Feature, work: Work) -> Feature:
-    """The feature with what a sheet may have taken of it that was fitted through it and bends as tightly."""
-    pieces, tip, height = work.base.parameters.get("pieces"), work.trace.tip_radius, feature.height
-    if not isinstance(pieces, list) or work.log.detections or kind_of(feature).sided:
+def told_over_sheet(work: Work, share: Share) -> None:
+    """The features with what a sheet took of them that was fitted through them and bends as tightly."""
+    pieces = work.base.parameters.get("pieces")
+    if isinstance(pieces, list) and not work.log.detections:
+        counts = [round(each) for each in pieces if isinstance(each, float)]
+        work.features = tuple(_over_sheet(feature, counts, work) for feature in work.features)
+
+
+def _over_sheet(feature: Feature, pieces: Sequence[int], work: Work) -> Feature:
+    tip, height = work.trace.tip_radius, feature.height
+    if kind_of(feature).sided:
         return feature
     width = max(2.0 * sizes_of(feature, tip).half_width, feature.width.high)
-    rise = sheet_moved(work.trace, [round(each) for each in pieces if isinstance(each, float)], feature.axis, width)
+    rise = sheet_moved(work.trace, pieces, feature.axis, width)
     if 2.0 * abs(rise) < height.high - height.low:
         return feature
     lies = f"{length_text(abs(rise), 2)} {'higher' if rise > 0.0 else 'lower'}"

@@ -353,8 +353,8 @@ def _sheet_of(cloud: Cloud, pieces: Sequence[int], among: BoolArray | None = Non
 def sheet_moved(trace: Trace, pieces: Sequence[int], axis: FloatArray, width: float) -> float:
     """How far a sheet that was fitted through a detail moves under it, m, if nothing of the detail is fitted.
 
-    Above zero if it rises. Where its pieces are as short as the detail, the sheet takes a part of it, and without it
-    only its neighbours and its stiffness say where it lies: the truth is between the two.
+    Above zero if it rises, 0 where what is left could not be fitted. Where its pieces are as short as the detail, the
+    sheet takes a part of it, and without it only its neighbours and its stiffness say where it lies.
 
     Args:
         trace: that the sheet was fitted to.
@@ -366,7 +366,10 @@ def sheet_moved(trace: Trace, pieces: Sequence[int], axis: FloatArray, width: fl
     # in the plane over which the sheet is a height: the centres are a radius above the detail
     line = ((axis - cloud.origin) @ cloud.axes.T) * [1.0, 1.0, 0.0]
     away = distances(cloud.points * [1.0, 1.0, 0.0], line)
-    fits = [_sheet_of(cloud, pieces, among) for among in (None, away > 0.5 * OF_DETAIL * width)]
+    beside = away > 0.5 * OF_DETAIL * width
+    if beside.sum() < 4 * (pieces[0] + 3) * (pieces[1] + 3):
+        return 0.0
+    fits = [_sheet_of(cloud, pieces, among) for among in (None, beside)]
     middle = away <= max(0.25 * width, float(away.min()))
     return float(np.median((fits[0].residual - fits[1].residual)[middle]))
 

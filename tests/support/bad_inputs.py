@@ -104,7 +104,12 @@ def scenes() -> None:
         ('smallest_feature = "0.3 mm"', 'smallest_feature = "0 mm"', "survey.smallest_feature"),
         ('smallest_feature = "0.3 mm"', 'smallest_feature = "1 km"', "survey.smallest_feature"),
         ('smallest_feature = "0.3 mm"', 'smallest_feature = "0.3 m"', "300 mm high on a mesh of 200 mm"),
-        ('smallest_feature = "0.3 mm"', 'smallest_feature = "0.3 nm"', "survey.smallest_feature is 3e-10 m", "1e-07 to 10 m"),
+        (
+            'smallest_feature = "0.3 mm"',
+            'smallest_feature = "0.3 nm"',
+            "survey.smallest_feature is 3e-10 m",
+            "1e-07 to 10 m",
+        ),
         ('time_budget = "10 min"', 'time_budget = "1 s"', "take about 4 min 13 s", "time budget is 1 s"),
         ('smallest_feature = "0.3 mm"', "", "survey.smallest_feature"),
         ('smallest_feature = "0.3 mm"', 'smalest_feature = "0.3 mm"', "did you mean"),

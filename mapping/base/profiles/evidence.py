@@ -78,8 +78,7 @@ class Scatter:
         for side, order in enumerate((slice(None), slice(None, None, -1))):
             off = residual[order]
             out = np.sign(off[0]) * off > FEATURE_RESIDUAL_SDS * found.sd
-            run = len(out) if out.all() else int(np.argmin(out))
-            if float(saved[order][:run].sum()) > price:
-                back = np.sign(off[0]) * off[run:] < found.sd
-                cut[side] = run + int(np.argmax(back))
+            run = int(np.argmin(out))  # 0 if all of it were off: then it is no base that anything leaves
+            if run and float(saved[order][:run].sum()) > price:
+                cut[side] = run + int(np.argmax(np.sign(off[0]) * off[run:] < found.sd))
         return cut[0], len(residual) - cut[1]
