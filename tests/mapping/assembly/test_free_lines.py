@@ -54,7 +54,11 @@ def bead(x: FloatArray, y: FloatArray) -> FloatArray:
 
 @pytest.mark.parametrize(
     ("form", "kind", "height", "width"),
-    [(scratch, "groove", -1.2e-6, 16e-6), (slot, "groove", -1.5e-6, 19.6e-6), (bead, "ridge", 1e-6, 23e-6)],
+    [
+        (scratch, "groove", -1.2e-6, 16e-6),
+        (slot, "groove", -1.5e-6, 19.6e-6),
+        pytest.param(bead, "ridge", 1e-6, 23e-6, marks=pytest.mark.slow),
+    ],
 )
 def test_a_wide_line_is_one_with_the_sizes_of_its_mean_section(
     form: Form, kind: str, height: float, width: float

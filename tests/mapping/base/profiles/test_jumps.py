@@ -25,7 +25,7 @@ def rough(seed: int) -> FloatArray:
     return np.asarray(3e-3 * X + 50e-9 * roughness + 10e-9 * rng.standard_normal(len(X)))
 
 
-@pytest.mark.parametrize("height", [2.2e-6, 4.1e-6, 6.3e-6])
+@pytest.mark.parametrize("height", [2.2e-6, *(pytest.param(h, marks=pytest.mark.slow) for h in (4.1e-6, 6.3e-6))])
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_step_of_a_rough_profile_is_one_step_with_its_height(height: float, seed: int) -> None:
     trace = Trace.from_profile(X, rough(seed) + step_height(X - 3e-3, height, TIP) + TIP, TIP)

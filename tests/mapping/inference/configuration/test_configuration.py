@@ -105,6 +105,7 @@ def test_details_together_leave_what_the_ball_feels_of_them(body: str, off: floa
         assert np.abs(beside.templates(np.tile(start[k], (2, 1))) - felt).max() < 1e-15
 
 
+@pytest.mark.slow
 def test_where_grooves_cross_is_worked_out_once_for_all_that_differs_in_other_details(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
