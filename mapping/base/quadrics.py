@@ -32,7 +32,8 @@ FEWEST_FACETS, FACETS_OF_PIECE = 96, 12
 # Coefficients of a sheet: a bound on the time, which grows with their cube (300 take 0.8 CPU s). Pieces are longer
 # where more would be needed, down to so many along an axis, of which both axes together fit the bound
 MOST_COEFFICIENTS, FEWEST_PIECES = 300, 8
-# Cells of a trace that bodies are fitted to, at most
+# Cells of a trace that bodies are fitted to, at most: a sheet takes four for each of its coefficients, and three times
+# as many let details take a half of the path and more
 MOST_BASE_CELLS = 4000
 # Widths of a detail beyond which nothing of it is left: a bell's width is 2.3 standard deviations to either side, where
 # the tangents of its flanks meet the base, and at 1.5 times that it is as high as 0.3 % of its crest

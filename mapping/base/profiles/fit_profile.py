@@ -119,12 +119,15 @@ def _likeliest(
 
     def best(edges: list[int]) -> tuple[float, RobustFit, _Spline]:
         up = steps_up(edges, count)
-        designs = [(each, np.hstack([each.design, up])) for each in splines]
         # a curve may be held by the half of a profile that is fine, or by all of it where all is rough
         scales = {least, max(least, robust_scale(freest))}
-        fits = [(robust_fit(design, z, sd), each) for each, design in designs for sd in scales]
-        rigid = [(fit, each) for fit, each in fits if each.pieces == 1]
-        fits += [(fit_on_densest(np.hstack([each.design, up]), fit, least, scatter.span), each) for fit, each in rigid]
+        fits = list[tuple[RobustFit, _Spline]]()
+        for each in splines:
+            design = np.hstack([each.design, up])
+            own = [robust_fit(design, z, sd) for sd in scales]
+            if each.pieces == 1:
+                own += [fit_on_densest(design, fit, least, scatter.span) for fit in own]
+            fits += [(fit, each) for fit in own]
         price = scatter.price(count)
 
         def cost(fit: RobustFit) -> float:
