@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         perturbed as perturbed,
         relative_sd as relative_sd,
     )
-    from mapping.instrument.core import core_of as core_of, fit_on_densest as fit_on_densest
+    from mapping.instrument.core import core_of as core_of, fit_on_densest as fit_on_densest, span_of as span_of
     from mapping.instrument.levels import Levels as Levels
     from mapping.instrument.noise import Noise as Noise, estimate_noise as estimate_noise
     from mapping.instrument.noise_fit import fit_noise as fit_noise
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "averaging": ("Means", "RunMeans", "running_mean", "running_means"),
     "block_likelihood": ("Blocks", "NoiseFit", "perturbed", "relative_sd"),
-    "core": ("core_of", "fit_on_densest"),
+    "core": ("core_of", "fit_on_densest", "span_of"),
     "levels": ("Levels",),
     "noise_fit": ("fit_noise",),
     "noise": ("Noise", "estimate_noise"),

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mapping import FloatArray
-from mapping.instrument.robust import RobustFit, robust_scale
+from mapping.instrument.robust import FEATURE_RESIDUAL_SDS, RobustFit, robust_scale
 
 # Shares that may stand off. With fewer than one in ten left there is no core; the least keeps a single residual from
 # ruling all others out
@@ -37,6 +37,12 @@ class Core(NamedTuple):
     def _normal(self, residual: FloatArray) -> FloatArray:
         away = np.minimum(np.abs(residual) / self.sd, FARTHEST)
         return np.asarray((1.0 - self.off) * np.exp(-0.5 * away**2) / (np.sqrt(2.0 * np.pi) * self.sd))
+
+
+def span_of(residual: FloatArray, least: float) -> float:
+    """The heights, m, in which what stands off may lie anywhere: those of all residuals (N,), m, and no less than where
+    a core of the least scatter lies, within which nothing stands off."""
+    return max(float(np.ptp(residual)), 2.0 * FEATURE_RESIDUAL_SDS * least)
 
 
 def core_of(residual: FloatArray, least: float, span: float) -> Core:

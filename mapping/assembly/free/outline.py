@@ -7,7 +7,7 @@ import numpy as np
 from mapping import FloatArray
 from mapping.assembly.free.section import FLANK, Section, flanks
 from mapping.base import SHORTEST_LEVEL, SweepHeights
-from mapping.instrument import core_of, neighbour_scatter
+from mapping.instrument import core_of, neighbour_scatter, span_of
 
 # Widths of a crest of no width of its own, felt at the same share of the height, from which on the trace is the
 # section: what is felt is then mostly the detail's own. Below, families know what the ball hides. Over 80 scratches
@@ -57,7 +57,7 @@ def _sections(piece: SweepHeights, tip_radius: float, longest: float, least: flo
     z, found = piece.height, []
     smallest = max(neighbour_scatter(z), np.finfo(float).tiny)
     # of a rack two thirds are wide details: their own heights are not what the rest scatters by
-    usual = core_of(z, smallest, max(float(np.ptp(z)), smallest)).sd
+    usual = core_of(z, smallest, span_of(z, smallest)).sd
     for sign in (1.0, -1.0):
         out = np.concatenate([[False], sign * z > FLANK_SDS * usual, [False]])
         edges = np.flatnonzero(np.diff(out.astype(int)))

@@ -14,7 +14,7 @@ from mapping.base.profiles.frame import ProfileFrame
 from mapping.base.profiles.isolated_bends import Bend, isolated_bends, isolated_rest
 from mapping.base.profiles.jumps import MOST_JUMPS, are_apart, possible_jumps, steps_up
 from mapping.geometry.mesh import Spline, spline_design
-from mapping.instrument import RobustFit, fit_on_densest, neighbour_scatter, robust_fit, robust_scale
+from mapping.instrument import RobustFit, fit_on_densest, neighbour_scatter, robust_fit, robust_scale, span_of
 
 # A base bends over no less than this many tip radii: shorter details are features.
 SHORTEST_BEND = 8.0
@@ -114,7 +114,7 @@ def _likeliest(
     candidates = [int(i) for i in possible_jumps(x, z, scale)]
     least = max(scale, LEAST_DIGITS * float(np.abs(z).max()), np.finfo(float).tiny)
     freest = robust_fit(np.hstack([splines[-1].design, steps_up(candidates, count)]), z, least).residual
-    span = max(float(np.ptp(robust_fit(splines[0].design, z, least).residual)), least)
+    span = span_of(robust_fit(splines[0].design, z, least).residual, least)
     scatter = Scatter.left_by(freest, least, span)
 
     def best(edges: list[int]) -> tuple[float, RobustFit, _Spline]:

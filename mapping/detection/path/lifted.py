@@ -211,10 +211,10 @@ def _foot(aside: FloatArray, height: FloatArray, at: int, way: int, unsure: floa
     foot = 0
     while True:
         near = up[foot : np.searchsorted(gone, gone[foot] + tip, side="right")]
-        lowest = near.min()
-        if lowest > up[foot] - unsure:
+        further = int((near <= near.min() + unsure).argmax())  # the first that is as low but for the noise
+        if further == 0:
             return at + way * foot
-        foot += int((near <= lowest + unsure).argmax())  # the first that is as low but for the noise
+        foot += further
 
 
 def _turns_too_sharply(aside: FloatArray, height: FloatArray, radius: float) -> bool:

@@ -89,6 +89,13 @@ def test_the_misfit_of_noise_alone_is_that_of_a_normal_law_and_details_cost_thei
     assert scatter.share_on(far) == pytest.approx(2 / 3, abs=0.01)
 
 
+@pytest.mark.parametrize("noise", [0.0, 5e-7])
+def test_most_of_a_bare_profile_lies_on_its_base(noise: float) -> None:
+    bare = 0.01 * X + noise * np.random.default_rng(1).standard_normal(len(X))
+    base = fit_base(Trace.from_profile(X, bare + TIP, TIP))
+    assert base.parameters["on_base"] > 0.75 and "open_ends" not in base.parameters
+
+
 def test_places_that_deviate_alike_count_once() -> None:
     """Of a correlation exp(-k / 8) from place to place the sum over all lags is coth(1 / 16)."""
     step = np.exp(-1.0 / 8.0)

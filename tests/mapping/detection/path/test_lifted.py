@@ -118,3 +118,10 @@ def test_lifts_say_from_which_side_a_plate_was_felt() -> None:
     assert found is not None
     assert found.inwards
     assert (felt & ~found.felt).sum() <= 5 * 2 * len(ROWS)
+
+
+def test_an_exact_path_that_rises_to_its_end_is_searched_to_its_end() -> None:
+    """Without noise its lowest place within a radius is as low as itself, and was gone to for ever."""
+    x = 1e-5 * np.arange(500)
+    trace = Trace.from_profile(x, 0.5 * np.maximum(0.0, x - 3e-3), 5e-5)
+    assert lifted(LaidTrace.of(trace, fit_base(trace))) is None
