@@ -79,8 +79,8 @@ def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[FreeSe
     for crossing in detections.crossings:
         by_sweep.setdefault(crossing.sweep, []).append(crossing)
     levelled = len(trace.base.levels) > 1  # nothing was noticed of what one of them is the floor or the plateau of
-    # a single profile, or one on levels, may have a level wherever it lies as high for long
-    share = SHORTEST_LEVEL if levelled or trace.base.kind == "profile" else LONGEST_OF_A_ROW
+    # over a base with levels, what lies as high for long may be one of them
+    share = SHORTEST_LEVEL if levelled else LONGEST_OF_A_ROW
     # what several sweeps feel is judged together once they are linked
     least = WIDER_THAN_CREST if len(trace.laid_sweeps) == 1 else OF_WIDE_LINE
     for sweep in trace.laid_sweeps:
@@ -136,7 +136,7 @@ def free_spot(section: FreeSection, algorithm: int) -> Feature:
 def _on_levels(piece: SweepHeights, trace: LaidTrace, least: float) -> list[Section]:
     """The sections of a piece over the levels that it runs on; none over a base of one level."""
     over = terraced(piece, trace.base, trace.tip_radius).profile
-    return [] if over is piece else of_all_scales(over, trace.tip_radius, least=least)
+    return [] if over is piece else of_all_scales(over, trace.tip_radius, LONGEST_OF_A_ROW, least)
 
 
 def _measured(

@@ -77,6 +77,23 @@ def test_a_wide_detail_of_any_form_is_one_with_its_sizes(
     assert found.evidence.likely
 
 
+@pytest.mark.parametrize("wide", [4e-3, pytest.param(12e-3, marks=pytest.mark.slow)])
+def test_a_wide_detail_may_be_a_large_part_of_its_profile(wide: float) -> None:
+    """A notch of 4 mm, or of 12, in 30 mm that a ball of 1 mm was drawn over: no level is so slanted."""
+    tip, fine = 0.5e-3, 5e-6
+    grid, x = fine * np.arange(6000), 50e-6 * np.arange(600)
+    ball = np.sqrt(tip**2 - (fine * np.arange(-99, 100)) ** 2) - tip
+    notch = -1e-3 * np.maximum(0.0, 1.0 - np.abs(grid - 13e-3) / (0.5 * wide))
+    heights = np.interp(x, grid, grey_dilation(notch, structure=ball, mode="nearest"))
+    heights += 2e-6 * np.random.default_rng(2).standard_normal(len(x))
+    profile = Trace.from_profile(x, heights + tip, tip)
+    base = fit_base(profile)
+    (found,) = assemble(detect(profile, base), profile, base)
+    assert found.kind == "pit" and found.details.free_section
+    assert found.width.low - 20e-6 < wide < found.width.high + 20e-6
+    assert found.height.low - 10e-6 < -1e-3 < found.height.high + 10e-6
+
+
 @pytest.mark.parametrize(("depth", "width"), [(1.2e-6, 16e-6), (0.5e-6, 9e-6), (2e-6, 30e-6)])
 @pytest.mark.parametrize("share", [0.04, 0.08])
 def test_a_faint_scratch_is_read_in_bins_as_wide_as_its_noise_asks_for(
