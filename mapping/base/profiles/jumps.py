@@ -20,6 +20,10 @@ JUMP_SDS = 6.0
 KEPT_SHARE = 0.5
 # Edges that are looked at, the highest: a staircase has no more levels of the shortest length
 MOST_JUMPS = 7
+# Places that an edge may take: the ball rolls over the edge of a step lower than its radius, and a flank may be
+# slanted. The narrowest over which it rises is taken; an edge wider than that share of half a level is a slope
+WIDTHS_OF_EDGE = (1, 2, 4, 8, 16, 32, 64, 128)
+WIDEST_EDGE = 0.5
 # Places beyond the last edge, or before the first, at least: what is there does not come back, so it is no detail
 # however short it is, and its median bears one place on the edge itself
 FEWEST_AT_END = 3
@@ -35,19 +39,35 @@ def possible_jumps(x: FloatArray, z: FloatArray, scale: float) -> IntArray:
     side = int(0.5 * SHORTEST_LEVEL * len(z))
     if side < 3:
         return np.zeros(0, dtype=np.int64)
-    rise = np.diff(z)
+    found = list[tuple[float, int]]()
+    for width in WIDTHS_OF_EDGE[: int(np.searchsorted(WIDTHS_OF_EDGE, WIDEST_EDGE * side, side="right"))]:
+        narrower = [i for _, i in found]
+        further = [(rise, i) for rise, i in _rises(x, z, scale, width, side) if not _near(i, narrower, width)]
+        found += further
+    return np.array([i for _, i in sorted(found, key=lambda each: -each[0])[: 2 * MOST_JUMPS]], dtype=np.int64)
+
+
+def _rises(x: FloatArray, z: FloatArray, scale: float, width: int, side: int) -> list[tuple[float, int]]:
+    """How high a profile rises for good over so many places, and after which index the middle of that lies."""
+    rise = z[width:] - z[:-width]
     off = rise - np.median(rise)
     usual = max(robust_scale(off), np.sqrt(2.0) * scale, np.finfo(float).tiny)
-    slope = np.median(rise / np.maximum(np.diff(x), np.finfo(float).tiny))
-    found = []
-    for i in np.flatnonzero(np.abs(off) > JUMP_SDS * usual):
-        before, after = slice(max(i + 1 - side, 0), i + 1), slice(i + 1, i + 1 + side)
-        if min(i + 1, len(z) - i - 1) < FEWEST_AT_END:
+    slope = np.median(np.diff(z) / np.maximum(np.diff(x), np.finfo(float).tiny))
+    found = list[tuple[float, int]]()
+    for i in sorted(np.flatnonzero(np.abs(off) > JUMP_SDS * usual), key=lambda i: -abs(off[i])):
+        middle = int(i) + (width - 1) // 2
+        before, after = slice(max(i + 1 - side, 0), i + 1), slice(i + width, i + width + side)
+        if min(i + 1, len(z) - i - width) < FEWEST_AT_END or _near(middle, [each for _, each in found], width):
             continue
         level = np.median(z[after] - slope * x[after]) - np.median(z[before] - slope * x[before])
         if KEPT_SHARE < level / off[i] < 1.0 / KEPT_SHARE:
-            found.append(i)
-    return np.array(sorted(found, key=lambda i: -abs(off[i]))[: 2 * MOST_JUMPS], dtype=np.int64)
+            found.append((abs(off[i]), middle))
+    return found
+
+
+def _near(index: int, others: list[int], width: int) -> bool:
+    """True of what lies within so many places of another, wider than one."""
+    return width > 1 and any(abs(index - other) < width for other in others)
 
 
 def are_apart(edges: list[int], count: int) -> bool:

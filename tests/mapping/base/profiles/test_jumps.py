@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import grey_dilation
 
 from mapping import FloatArray, Trace
 from mapping.assembly import assemble
@@ -41,6 +42,22 @@ def test_stairs_have_as_many_levels() -> None:
     base = fit_base(Trace.from_profile(X, rough(2) + stairs + TIP, TIP))
     gaps = np.diff(np.sort(base.levels))
     assert len(base.levels) == 4 and gaps == pytest.approx(3e-6, abs=0.3e-6)
+
+
+@pytest.mark.parametrize(("height", "run"), [(0.4e-3, 0.0), (-0.1e-3, 0.0), (0.3e-3, 0.6e-3)])
+def test_a_step_that_the_ball_rolls_over_is_one(height: float, run: float) -> None:
+    """Lower than the ball's radius, or slanted: no two samples lie on either side of it."""
+    tip, x = 0.5e-3, 50e-6 * np.arange(600)
+    rng = np.random.default_rng(4)
+    grid = np.arange(-1e-3, 31e-3, 5e-6)
+    body = height * np.clip((grid - 12e-3) / max(run, 1e-9), 0.0, 1.0)
+    ball = np.sqrt(tip**2 - (5e-6 * np.arange(-99, 100)) ** 2) - tip
+    felt = np.interp(x, grid, grey_dilation(body, structure=ball, mode="nearest"))
+    trace = Trace.from_profile(x, felt + 2e-6 * rng.standard_normal(len(x)) + tip, tip)
+    base = fit_base(trace)
+    assert len(base.levels) == 2
+    (step,) = refine_all(assemble(detect(trace, base), trace, base), trace, 0, base=base)
+    assert step.kind == "step" and abs(step.height.median) == pytest.approx(abs(height), abs=4e-6)
 
 
 def test_scratches_slopes_and_waves_are_no_steps() -> None:
