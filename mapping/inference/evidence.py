@@ -18,10 +18,12 @@ from mapping import Feature, FloatArray, Interval, Posterior, length_text
 from mapping.inference.families import (
     BellRidgeShape,
     BellShape,
+    FlatTopped,
+    FrustumShape,
     PosteriorProblem,
+    RoundedFrustumShape,
     ShoulderedShape,
     Surroundings,
-    TrapezoidShape,
     WornTipShape,
     with_free_tip,
     with_nominal_tip,
@@ -132,7 +134,7 @@ def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, P
     worn = _worn_note(likely)
     feature = replace(feature, notes=(*feature.notes, *worn))
     kind, shapes = kind_of(feature), [_shape(problem) for _, problem, _ in likely]
-    if len(likely) == 1 and not worn and not isinstance(shapes[0], BellRidgeShape | TrapezoidShape):
+    if len(likely) == 1 and not worn and not isinstance(shapes[0], BellRidgeShape | FlatTopped):
         return feature
     bells = [isinstance(shape, BellShape | BellRidgeShape) for shape in shapes]
     total, foot = sum(share for share, _, _ in likely), 1.0
@@ -192,11 +194,13 @@ def name_of(problem: PosteriorProblem) -> str:
 def _section_name(shape: Shape) -> str:
     if isinstance(shape, BellShape | BellRidgeShape):
         return "bell"
-    if isinstance(shape, ShoulderedShape):
+    if isinstance(shape, ShoulderedShape | RoundedFrustumShape):
         return "flat-topped with round edges"
-    if not isinstance(shape, TrapezoidShape):
+    if not isinstance(shape, FlatTopped):
         return "round"
-    return "triangular" if shape.roof else "flat-topped"
+    if not shape.roof:
+        return "flat-topped"
+    return "conical" if isinstance(shape, FrustumShape) else "triangular"
 
 
 def _shape(problem: PosteriorProblem) -> Shape:

@@ -283,7 +283,7 @@ def _check(part: Part) -> None:
         raise ContactError(
             f"an axis and its normals must be finite and of one shape (K, 3); found {axis.shape} and {normals.shape}"
         )
-    if isinstance(part, Bar | Swell) and len(axis) < 2:
-        raise ContactError(f"a {type(part).__name__.lower()} runs along an axis of two points at least; found one")
+    if isinstance(part, Swell) and len(axis) < 2:
+        raise ContactError("a swell runs along an axis of two points at least; found one")
     if isinstance(part, Terrace) and (len(axis) < 2 or is_closed(axis)):
         raise ContactError("a step's edge needs two ends; a closed one, or a single point, says no higher side")

@@ -93,10 +93,46 @@ def rim_arcs(
 
 
 def bar_mesh(bar: Bar, base: NearestPoint) -> Mesh:
-    """(vertices, faces) of the flanks, the top and the square ends of a bar, m; the foot is left open."""
+    """(vertices, faces) of the flanks, the top and the square ends of a bar, m; the foot is left open.
+
+    About a point it is turned round the normal there.
+    """
+    if len(bar.axis) == 1:
+        return _turned_mesh(bar, base)
     laterals = _mitres(bar.axis)[:, None] * _laterals(bar.axis, bar.normals)
+    offsets, rises = _outline(bar, base, laterals)
+    offsets, rises = np.append(-offsets[:0:-1], offsets), np.append(rises[:0:-1], rises)
+    feet = [draped(bar.axis + away * laterals, base) for away in offsets]
+    rows = [points + rise * bar.height * normals for (points, normals), rise in zip(feet, rises, strict=True)]
+    mesh = _strips(rows)
+    if is_closed(bar.axis):
+        return mesh
+    caps = [_strips([np.array([points[end] for points, _ in feet]), np.array([row[end] for row in rows])])
+            for end in (0, -1)]  # fmt: skip
+    return joined([mesh, *caps])
+
+
+def _turned_mesh(bar: Bar, base: NearestPoint) -> Mesh:
+    """(vertices, faces) of a section turned about the normal of its point."""
+    across, along = _plane(bar.normals[0])
+    offsets, rises = _outline(bar, base, across[None])
+    turn = np.linspace(0.0, 2.0 * np.pi, _chords(max(float(offsets[-1]), CHORD_ERROR)) + 1)
+    # half of what the chords miss lies to either side
+    ring = (
+        2.0 / (1.0 + np.cos(np.pi / (len(turn) - 1))) * (np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * along)
+    )
+    rows = []
+    for away, rise in zip(offsets, rises, strict=True):
+        points, normals = draped(bar.axis + away * ring, base)
+        rows.append(points + rise * bar.height * normals)
+    vertices, faces = _strips(rows)
+    return vertices, faces[len(turn) - 1 :]  # its middle is a point: the first half of the first strip is nothing
+
+
+def _outline(bar: Bar, base: NearestPoint, laterals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Distances (J,) from the middle of a section outwards, m, and heights there as shares of the whole."""
     half = 0.5 * bar.top
-    offsets, rises = np.zeros(1), np.ones(1)  # from the middle outwards
+    offsets, rises = np.zeros(1), np.ones(1)
     for inner, outer, falls in ((0.0, half, False), (half, half + bar.run, True)):
         ends = [draped(bar.axis + side * away * laterals, base)[0] for side in (-1, 1) for away in (inner, outer)]
         middles = [draped(bar.axis + side * 0.5 * (inner + outer) * laterals, base)[0] for side in (-1, 1)]
@@ -112,15 +148,7 @@ def bar_mesh(bar: Bar, base: NearestPoint) -> Mesh:
         wall = [half + a] if a < bar.height else []
         offsets = np.concatenate([offsets[:-1], half + a * np.sin(turn), wall])
         rises = np.concatenate([rises[:-1], 1.0 - a * (1.0 - np.cos(turn)) / bar.height, np.zeros(len(wall))])
-    offsets, rises = np.append(-offsets[:0:-1], offsets), np.append(rises[:0:-1], rises)
-    feet = [draped(bar.axis + away * laterals, base) for away in offsets]
-    rows = [points + rise * bar.height * normals for (points, normals), rise in zip(feet, rises, strict=True)]
-    mesh = _strips(rows)
-    if is_closed(bar.axis):
-        return mesh
-    caps = [_strips([np.array([points[end] for points, _ in feet]), np.array([row[end] for row in rows])])
-            for end in (0, -1)]  # fmt: skip
-    return joined([mesh, *caps])
+    return offsets, rises
 
 
 def swell_mesh(swell: Swell, base: NearestPoint) -> Mesh:

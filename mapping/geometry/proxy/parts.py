@@ -30,10 +30,10 @@ class Chain:
 @dataclass(frozen=True, eq=False)
 class Bar:
     """A ridge with a flat top and straight flanks, from upright walls (run 0) to a roof (top 0), or with round
-    edges over upright walls; its ends are square.
+    edges over upright walls; its ends are square. About a single point it is a bump, from a disc to a cone.
 
     Args:
-        axis: (K, 3) points of the base under the middle, m, K >= 2; first equals last of a closed one.
+        axis: (K, 3) points of the base under the middle, m; first equals last of a closed one.
         normals: (K, 3) outward unit normals there.
         height: of the top over the base, m, positive.
         top: width of the top, m, at least 0.

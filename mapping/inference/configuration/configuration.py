@@ -22,6 +22,7 @@ from mapping.inference.families import (
     TwinShape,
     bell_beside,
     bell_ridge_beside,
+    frustum_beside,
     smooth_beginnings,
     smooth_groove_beside,
     trapezoid_beside,
@@ -296,6 +297,13 @@ def as_bar(part: Part, place: Neighbourhood, top: float) -> Part:
     ridge: Any = part.shape
     bar = trapezoid_beside(ridge, sizes_of(part.feature, ridge.tip_radius), roof=False)
     return Part(part.feature, bar, np.concatenate([part.start[:-1], np.log([top, 0.02 * place.half_width])]))
+
+
+def as_frustum(part: Part, place: Neighbourhood, top: float) -> Part:
+    """A round bump with a flat top of a width (m) and upright flanks."""
+    cap: Any = part.shape
+    frustum = frustum_beside(cap, sizes_of(part.feature, cap.tip_radius), roof=False)
+    return Part(part.feature, frustum, np.append(part.start[:-1], np.log([top, 0.02 * place.half_width])))
 
 
 def as_bell(part: Part, half: float) -> Part:

@@ -21,6 +21,7 @@ from mapping.inference.configuration.configuration import (
     about,
     as_bar,
     as_bell,
+    as_frustum,
     as_smooth,
     as_twin,
     laid,
@@ -76,12 +77,14 @@ MOST_DRAWN_THROUGH = 60
 
 def sections(now: Configuration) -> Iterator[Parts]:
     """Another section of a line that is wider than a wire of its height: round, flat, running out, or two in one; a
-    bump whose flank runs out, and a groove whose walls do."""
+    bump whose flank runs out or with a flat top, and a groove whose walls do."""
     for k, part in enumerate(now.parts):
         if isinstance(part.shape, BumpShape):
             half = sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
             for share in SKIRTS:
                 yield [*now.parts[:k], as_bell(part, share * half), *now.parts[k + 1 :]]
+            for share in TOPS:
+                yield [*now.parts[:k], as_frustum(part, now.place, share * half), *now.parts[k + 1 :]]
         if type(part.shape) is GrooveShape and not _has_crests_at_rims(part, now):
             yield [*now.parts[:k], as_smooth(now.parts, k, now.place), *now.parts[k + 1 :]]
         ridge = _ridge_of(part, now.place)
@@ -342,6 +345,9 @@ def other_kinds(now: Configuration) -> Iterator[Parts]:
         point = as_point(replace(part.feature, axis=axis), now.place.around.trace.tip_radius)
         if point is not None:
             yield [*rest, part_of(point, now.place)]
+            if isinstance(part.shape, TrapezoidShape):  # the ball stands on a flat top no higher than that
+                flat = part_of(replace(point, height=part.feature.height), now.place)
+                yield [*rest, as_frustum(flat, now.place, float(part.shape.parts(part.start[None])[1][0]))]
         if not kind.line:
             shape: Any = part.shape
             like, half_length = replace(part.feature, kind=other.name), SHORT_LINE * half

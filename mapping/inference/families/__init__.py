@@ -44,8 +44,14 @@ if TYPE_CHECKING:
     )
     from mapping.inference.families.step import OffsetRims as OffsetRims, StepShape as StepShape
     from mapping.inference.families.trapezoid import (
+        FlatTopped as FlatTopped,
+        FrustumShape as FrustumShape,
+        RoundedFrustumShape as RoundedFrustumShape,
         ShoulderedShape as ShoulderedShape,
         TrapezoidShape as TrapezoidShape,
+        flat_topped_widths as flat_topped_widths,
+        frustum_beside as frustum_beside,
+        rounded_frustum_beside as rounded_frustum_beside,
         shouldered_beside as shouldered_beside,
         shouldered_widths as shouldered_widths,
         touched_widths as touched_widths,
@@ -94,10 +100,16 @@ _PUBLIC = {
     ),
     "step": ("OffsetRims", "StepShape"),
     "trapezoid": (
+        "FlatTopped",
+        "FrustumShape",
+        "RoundedFrustumShape",
         "ShoulderedShape",
         "TrapezoidShape",
-        "shouldered_widths",
+        "flat_topped_widths",
+        "frustum_beside",
+        "rounded_frustum_beside",
         "shouldered_beside",
+        "shouldered_widths",
         "touched_widths",
         "trapezoid_beside",
     ),

@@ -1,4 +1,5 @@
-"""TrapezoidShape, ShoulderedShape: lines with a flat top, from a bar to a roof, or with round edges."""
+"""TrapezoidShape, ShoulderedShape: lines with a flat top, from a bar to a roof, or with round edges; FrustumShape,
+RoundedFrustumShape: spots with such a section, from a disc to a cone."""
 
 from __future__ import annotations
 
@@ -10,7 +11,8 @@ import numpy as np
 from mapping import FloatArray
 from mapping.geometry.templates import contact_half_width, flat_outline, shouldered_outline, width_of_cap
 from mapping.inference.curves import Chart, CurveModes, Mouth, laid_beyond, mouths_of, opened
-from mapping.inference.families.nodes import line_nodes
+from mapping.inference.families.bump import BumpShape, Spot
+from mapping.inference.families.nodes import line_nodes, point_nodes
 from mapping.inference.families.problem import Sizes
 from mapping.inference.families.ridge import RidgeShape, rounding_of
 from mapping.inference.likelihood import Prior, Uniform, Window
@@ -118,15 +120,93 @@ class ShoulderedShape(TrapezoidShape):
         return out
 
 
+@dataclass(frozen=True, eq=False)
+class FrustumShape:
+    """Bumps with a flat round top: position, height, log width of the top, log run of the flank all round.
+
+    A trapezoid turned about its middle, from a disc with upright walls (a run of nothing) to a cone, which has no top.
+    `free` is 1 for a lone profile: the bump is then taken to lie under it, so that a line that the profile crosses at a
+    right angle leaves the same trace.
+
+    Reference: theory equation 7.3: of a section that goes round, only the distance from its outline counts.
+    """
+
+    window: Window
+    spot: Spot
+    tip_radius: float
+    free: int
+    roof: bool
+    priors: tuple[Prior, ...]
+    start: FloatArray
+    step: FloatArray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*("along", "across")[: self.free], "height", *(() if self.roof else ("log top",)), "log run")
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return (*("m", "m")[: self.free], "m", *(() if self.roof else ("ln m",)), "ln m")
+
+    def parts(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(W,) heights, widths of the top, and runs of the flank, m."""
+        if self.roof:
+            return theta[:, -2], np.zeros(len(theta)), np.exp(theta[:, -1])
+        return theta[:, -3], np.exp(theta[:, -2]), np.exp(theta[:, -1])
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights over the base's trace, m."""
+        height, top, run = self.parts(theta)
+        corners = 0.5 * top[:, None] + np.multiply.outer(run, [0.0, 1.0])
+        return self._turned(theta, top, corners, np.multiply.outer(height, [1.0, 0.0]), np.zeros(len(theta)))
+
+    def _turned(
+        self, theta: FloatArray, top: FloatArray, across: FloatArray, up: FloatArray, shoulders: FloatArray
+    ) -> FloatArray:
+        """Heights of a section that is turned about its middle: a line as long as its top, whose corners are round."""
+        from mapping.geometry.templates import section_heights
+
+        place = np.zeros((len(theta), 2))
+        place[:, : self.free] = theta[:, : self.free]
+        half, out = 0.5 * top, np.empty((len(theta), len(self.window)))
+        ends = np.column_stack([place[:, 0] - half, place[:, 0] + half])
+        section_heights(*self._places, place[:, 1:].copy(), ends, half, across, up, shoulders, self.tip_radius, out)
+        return out
+
+    @cached_property
+    def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        along, across = point_nodes(self.window, self.spot, self.tip_radius)
+        aside = np.stack([np.ones_like(across), np.zeros_like(across)])[:, None]
+        bend_along, bend = (np.full_like(along, each) for each in self.spot.bends)
+        return along, across, aside, bend, bend_along
+
+
+@dataclass(frozen=True, eq=False)
+class RoundedFrustumShape(FrustumShape):
+    """Bumps with a flat round top whose edge is round: as `FrustumShape`, with that log radius for the run."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*super().names[:-1], "log shoulder")
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights over the base's trace, m."""
+        height, top, shoulder = self.parts(theta)
+        return self._turned(theta, top, 0.5 * top[:, None], height[:, None].copy(), shoulder)
+
+
+# Sections with a flat top or straight flanks
+FlatTopped = TrapezoidShape | FrustumShape
+
+
 def trapezoid_beside(ridge: RidgeShape, sizes: Sizes, *, roof: bool) -> TrapezoidShape:
     """The family on a ridge's window, with its course, its ends and its height, and their priors."""
     course = ridge.modes.count
     # of the ridge's parameters all but the radius, and the rounding of its ends where no top has corners
     skipped = int(roof and not ridge.chart.closed)
     shared = [*range(course), *range(course + skipped, len(ridge.names) - 1)]
-    wide = Uniform(*np.log(sizes.half_width * np.array([NARROWEST_PART, WIDEST_PART])))
     parts = 1 if roof else 2
-    priors = (*(ridge.priors[k] for k in shared), *(wide,) * parts)
+    priors = (*(ridge.priors[k] for k in shared), *(_any_part(sizes),) * parts)
     guess = np.full(parts, np.log(0.2 * sizes.half_width))
     start = np.concatenate([ridge.start[shared], guess])
     step = np.concatenate([ridge.step[shared], [0.05, 0.1][-parts:]])
@@ -139,6 +219,30 @@ def shouldered_beside(ridge: RidgeShape, sizes: Sizes) -> ShoulderedShape:
     return ShoulderedShape(
         ridge.window, ridge.chart, ridge.modes, ridge.tip_radius, False, bar.priors, bar.start, bar.step
     )
+
+
+def frustum_beside(cap: BumpShape, sizes: Sizes, *, roof: bool) -> FrustumShape:
+    """The family on a cap's window, about its spot, with its height, and their priors."""
+    parts = 1 if roof else 2
+    return FrustumShape(cap.window, cap.spot, cap.tip_radius, cap.free, roof, *_section_beside(cap, sizes, parts))
+
+
+def rounded_frustum_beside(cap: BumpShape, sizes: Sizes) -> RoundedFrustumShape:
+    """The same with a round edge."""
+    priors, start, step = _section_beside(cap, sizes, 2)
+    priors = (*priors[:-1], cap.priors[-1])  # of a top of nothing its edge is the cap
+    return RoundedFrustumShape(cap.window, cap.spot, cap.tip_radius, cap.free, False, priors, start, step)
+
+
+def _section_beside(cap: BumpShape, sizes: Sizes, parts: int) -> tuple[tuple[Prior, ...], FloatArray, FloatArray]:
+    """Priors, start and step: of a cap all but the radius, and so many parts of a flat-topped section."""
+    start = np.append(cap.start[:-1], np.full(parts, np.log(0.2 * sizes.half_width)))
+    return (*cap.priors[:-1], *(_any_part(sizes),) * parts), start, np.append(cap.step[:-1], [0.05, 0.1][-parts:])
+
+
+def _any_part(sizes: Sizes) -> Prior:
+    """Of the width of a top, or the run of a flank."""
+    return Uniform(*np.log(sizes.half_width * np.array([NARROWEST_PART, WIDEST_PART])))
 
 
 def touched_widths(
@@ -156,6 +260,14 @@ def touched_widths(
     hidden = height * np.clip(tip - height, 0.0, None) > run * kink
     hidden |= height >= tip
     return np.where(hidden, top, foot), np.where(hidden, top + 2.0 * kink, foot)
+
+
+def flat_topped_widths(
+    shape: FlatTopped, draws: FloatArray, *, half_way: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """Those of draws (S, P) of a family."""
+    widths = shouldered_widths if isinstance(shape, ShoulderedShape | RoundedFrustumShape) else touched_widths
+    return widths(*shape.parts(draws), shape.tip_radius, half_way=half_way)
 
 
 def shouldered_widths(

@@ -1,8 +1,9 @@
-"""Crests: what bumps and ridges have in common, a round section that stands on the base, or one that runs out."""
+"""Crests: what bumps and ridges have in common, a section that stands on the base, round or flat, or runs out."""
 
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,18 @@ from mapping import Feature, FloatArray, Interval
 from mapping.geometry.mesh import nearest_on
 from mapping.geometry.proxy import Bar, Chain, Part
 from mapping.geometry.templates import chain_height, contact_half_width, radius_of_cap, width_of_cap
-from mapping.inference.families import bell_section, rounding_of, width_at_half_height
+from mapping.inference.families import (
+    BumpShape,
+    FlatTopped,
+    RidgeShape,
+    RoundedFrustumShape,
+    ShoulderedShape,
+    bell_section,
+    rounding_of,
+    shouldered_widths,
+    touched_widths,
+    width_at_half_height,
+)
 from mapping.inference.kinds.kind import Kind, Section
 from mapping.inference.likelihood import Shape
 
@@ -18,6 +30,13 @@ from mapping.inference.likelihood import Shape
 CREST_TRACE_REACH = 1.5
 # Tapers that a bell's optimum is searched from: with an edge, nearly a Gaussian, and with a long skirt
 BEGUN_TAPERS = (-0.4, 0.1, 1.0)
+# Widths of a flat top and runs of a flank, in half-widths of the disturbance, from which their optimum is searched:
+# upright and gentle flanks, tops that are hardly felt and such as fill the disturbance
+FLAT_STARTS = ((0.3, 0.02), (1.0, 0.02), (0.1, 0.6))
+# Run of an upright flank
+UPRIGHT_RUN = 0.02
+ROOF_STARTS = ((0.02,), (0.6,))
+SHOULDER_STARTS = ((0.3, 0.05), (1.0, 0.05))
 RUNS_OUT = "its flank runs out into the base: width at half height"
 
 
@@ -60,6 +79,24 @@ class Crest(Kind):
         known = {"radius": float(np.median(radii)), "top": None, "run": None, "shoulder": None}
         return Section(Interval.from_draws(draws[:, -2]), cap, known)
 
+    def has_plain_member(self, shape: Any) -> bool:
+        return isinstance(shape, RidgeShape | BumpShape)
+
+    def plain_odds(self, shape: Any, draws: FloatArray) -> float:
+        """Of a wire or a ball that lies on the base: its radius is half its height.
+
+        By the ratio of the densities of the radius there, after the data and before (Savage's ratio; Dickey, Annals of
+        Mathematical Statistics 42, 1971), the former from the draws by Gaussian kernels of Silverman's width.
+        """
+        if not self.has_plain_member(shape):
+            return 0.0
+        lying = np.log(0.5 * draws[:, -2])
+        off = draws[:, -1] - lying
+        width = 1.06 * max(float(off.std()), 1e-9) * len(off) ** -0.2
+        after = float(np.exp(-0.5 * (off / width) ** 2).mean()) / (width * np.sqrt(2.0 * np.pi))
+        before = float(np.exp(shape.priors[-1].log_density(np.median(lying))))
+        return float(after / before)
+
 
 def bell_said(draws: FloatArray) -> Section:
     """What draws (S, P) that end in height, log half width and taper say of a bell: how wide it is at half height."""
@@ -69,15 +106,24 @@ def bell_said(draws: FloatArray) -> Section:
     return Section(Interval.from_draws(draws[:, -3]), width, bell, RUNS_OUT)
 
 
+def flat_topped_said(shape: FlatTopped, draws: FloatArray) -> Section:
+    """What draws (S, P) say of a section with a flat top or straight flanks: its width is that of its foot."""
+    height, top, run = shape.parts(draws)
+    rounded = isinstance(shape, ShoulderedShape | RoundedFrustumShape)
+    parts = {"top": float(np.median(top)), "shoulder" if rounded else "run": float(np.median(run)), "radius": None}
+    foot = top + (width_of_cap(height, run) if rounded else 2.0 * run)
+    return Section(Interval.from_draws(height), Interval.from_draws(foot), parts | rounding_said(shape, draws))
+
+
 def rounding_said(shape: Shape, draws: FloatArray) -> dict[str, float | None]:
-    """What draws (S, P) say of the ends of a line with a flat top or bottom."""
+    """What draws (S, P) say of the ends of a line with a flat top or bottom; nothing of others."""
     if "end rounding" not in shape.names:
         return {}
     return {"end_rounding": float(np.median(rounding_of(draws[:, shape.names.index("end rounding")])))}
 
 
 def is_flat_topped(feature: Feature) -> bool:
-    """True of a line whose section has straight flanks, with a flat top or none, or a flat top with round edges."""
+    """True of a section with straight flanks, with a flat top or none, or of a flat top with round edges."""
     _, run, shoulder = _flat_parts(feature)
     return (
         feature.details.radius is None and feature.details.top is not None and (run is not None or shoulder is not None)
@@ -89,6 +135,15 @@ def _flat_parts(feature: Feature) -> tuple[float | None, float | None, float | N
     return feature.details.top, feature.details.run, feature.details.shoulder
 
 
+def flat_topped_reach(feature: Feature, tip_radius: float) -> float:
+    """Half of the width over which a flat-topped section disturbs the trace of a ball, m."""
+    top, run, shoulder = (np.array([each or 0.0]) for each in _flat_parts(feature))
+    height = np.array([abs(feature.height.median)])
+    if shoulder[0] > 0.0:
+        return 0.5 * float(shouldered_widths(height, top, shoulder, tip_radius)[1][0])
+    return 0.5 * float(touched_widths(height, top, run, tip_radius)[1][0])
+
+
 def crest_radius(feature: Feature) -> float:
     """Radius of a crest's section, m: as fitted, or of the cap of its height and width."""
     known = feature.details.radius
@@ -97,11 +152,11 @@ def crest_radius(feature: Feature) -> float:
 
 
 def _flat_topped(feature: Feature, feet: FloatArray, tip_radius: float) -> FloatArray:
-    """(N,) heights of a line with a flat top and straight flanks, m."""
+    """(N,) heights of a line or a spot with a flat top and straight flanks, m."""
     from mapping.geometry.templates import section_heights
 
     rounding, ends = feature.details.end_rounding, np.array([[-1e300, 1e300]])
-    if rounding is None or feature.closed:
+    if rounding is None or feature.closed or len(feature.axis) < 2:
         away, rounding = axis_distance(feet, feature.axis)[:, None], 0.0
         along = np.zeros_like(away)
     else:

@@ -8,37 +8,37 @@ from typing import Any
 
 import numpy as np
 
-from mapping import Feature, FloatArray, Interval
+from mapping import Feature, FloatArray
 from mapping.geometry.proxy import Part, Swell
 from mapping.geometry.templates import width_of_cap
 from mapping.inference.families import (
     BellRidgeShape,
     PosteriorProblem,
     RidgeShape,
-    ShoulderedShape,
     Sizes,
     TrapezoidShape,
     bell_ridge_beside,
     bell_widths,
+    flat_topped_widths,
     rounding_of,
     shouldered_beside,
-    shouldered_widths,
-    touched_widths,
     trapezoid_beside,
 )
-from mapping.inference.kinds.crests import BEGUN_TAPERS, Crest, bell_said, rounding_said
+from mapping.inference.kinds.crests import (
+    BEGUN_TAPERS,
+    FLAT_STARTS,
+    ROOF_STARTS,
+    SHOULDER_STARTS,
+    UPRIGHT_RUN,
+    Crest,
+    bell_said,
+    flat_topped_said,
+)
 from mapping.inference.kinds.kind import Section
 from mapping.inference.kinds.lines import ROUNDING_OF_ENDS, SQUARE_OR_ROUND, LineKind, Parameters, Traced, ended
 from mapping.inference.kinds.posterior_density import height_prior, radius_prior
 from mapping.inference.likelihood import Shape
 
-# Widths of a flat top and runs of a flank, in half-widths of the disturbance, from which their optimum is searched:
-# upright and gentle flanks, tops that are hardly felt and such as fill the disturbance
-FLAT_STARTS = ((0.3, 0.02), (1.0, 0.02), (0.1, 0.6))
-# Run of an upright flank
-UPRIGHT_RUN = 0.02
-ROOF_STARTS = ((0.02,), (0.6,))
-SHOULDER_STARTS = ((0.3, 0.05), (1.0, 0.05))
 # Half widths of a section that runs out, in half-widths of the disturbance, of which the best begins the search for its
 # optimum: from the least to the most, and how many
 BEGUN_HALVES = (0.02, 2.0, 15)
@@ -96,30 +96,7 @@ class Ridge(Crest, LineKind):
             return bell_said(draws)
         if not isinstance(shape, TrapezoidShape):
             return super().section(feature, shape, draws)
-        height, top, run = shape.parts(draws)
-        flank = "shoulder" if isinstance(shape, ShoulderedShape) else "run"
-        parts = {"top": float(np.median(top)), flank: float(np.median(run)), "radius": None}
-        parts |= rounding_said(shape, draws)
-        foot = top + (width_of_cap(height, run) if flank == "shoulder" else 2.0 * run)
-        return Section(Interval.from_draws(height), Interval.from_draws(foot), parts)
-
-    def has_plain_member(self, shape: Any) -> bool:
-        return isinstance(shape, RidgeShape)
-
-    def plain_odds(self, shape: Any, draws: FloatArray) -> float:
-        """Of a wire that lies on the base: its radius is half its height.
-
-        By the ratio of the densities of the radius there, after the data and before (Savage's ratio; Dickey, Annals of
-        Mathematical Statistics 42, 1971), the former from the draws by Gaussian kernels of Silverman's width.
-        """
-        if not self.has_plain_member(shape):
-            return 0.0
-        lying = np.log(0.5 * draws[:, -2])
-        off = draws[:, -1] - lying
-        width = 1.06 * max(float(off.std()), 1e-9) * len(off) ** -0.2
-        after = float(np.exp(-0.5 * (off / width) ** 2).mean()) / (width * np.sqrt(2.0 * np.pi))
-        before = float(np.exp(shape.priors[-1].log_density(np.median(lying))))
-        return float(after / before)
+        return flat_topped_said(shape, draws)
 
     def draws_of_height(self, shape: Shape, draws: FloatArray) -> FloatArray:
         if isinstance(shape, BellRidgeShape):
@@ -127,13 +104,10 @@ class Ridge(Crest, LineKind):
         return shape.parts(draws)[0] if isinstance(shape, TrapezoidShape) else draws[:, -2]
 
     def widths_felt(self, shape: Any, draws: FloatArray, *, half_way: bool = False) -> tuple[FloatArray, FloatArray]:
-        tip = shape.tip_radius
         if isinstance(shape, BellRidgeShape):
-            return bell_widths(draws, tip)
-        if isinstance(shape, ShoulderedShape):
-            return shouldered_widths(*shape.parts(draws), tip, half_way=half_way)
+            return bell_widths(draws, shape.tip_radius)
         if isinstance(shape, TrapezoidShape):
-            return touched_widths(*shape.parts(draws), tip, half_way=half_way)
+            return flat_topped_widths(shape, draws, half_way=half_way)
         width = width_of_cap((0.5 if half_way else 1.0) * draws[:, -2], np.exp(draws[:, -1]))
         return width, width
 
