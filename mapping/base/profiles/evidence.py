@@ -58,9 +58,13 @@ class Scatter:
         """Share of the places that lie on the curve."""
         return 1.0 - core_of(residual, self.least, self.span).off
 
+    def within(self, residual: FloatArray) -> float:
+        """How far a place on the curve lies off it at most, m."""
+        return FEATURE_RESIDUAL_SDS * core_of(residual, self.least, self.span).sd
+
     def ends_on(self, residual: FloatArray, edges: Sequence[int]) -> bool:
         """True if most of what lies before the first edge, and beyond the last one, lies on the level there."""
-        within = FEATURE_RESIDUAL_SDS * core_of(residual, self.least, self.span).sd
+        within = self.within(residual)
         ends = residual[: min(edges) + 1], residual[max(edges) + 1 :]
         return all(float(np.median(np.abs(end))) < within for end in ends)
 

@@ -12,7 +12,7 @@ from mapping.base.profiles.evidence import Scatter
 from mapping.base.profiles.form import AUTO, Form, form_line
 from mapping.base.profiles.frame import ProfileFrame
 from mapping.base.profiles.isolated_bends import Bend, isolated_bends, isolated_rest
-from mapping.base.profiles.jumps import MOST_JUMPS, are_apart, possible_jumps, steps_up
+from mapping.base.profiles.jumps import MOST_JUMPS, are_apart, possible_jumps, steps_up, told_apart
 from mapping.geometry.mesh import Spline, spline_design
 from mapping.instrument import RobustFit, fit_on_densest, neighbour_scatter, robust_fit, robust_scale, span_of
 
@@ -86,8 +86,7 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
     bends = isolated_bends(x, z, curve(x), scale) if pieces > 1 else []
     rest = isolated_rest(x, z, curve(x), scale, SHORTEST_BEND * trace.tip_radius)
     if edges:
-        known = np.unique(heights)
-        fitted["levels"] = known[np.argsort(np.abs(known), kind="stable")].tolist()
+        fitted["levels"] = told_apart(heights, scatter.within(best.residual)).tolist()
     if ends := _open_ends(x, z - curve(x), felt, frame, curve):
         fitted["open_ends"] = ends
     return ribbon, fitted | _listed("absorbed", bends, frame, curve) | _listed("left standing", rest, frame, curve)
@@ -144,7 +143,23 @@ def _likeliest(
         if not tried or min(each[0] for each in tried) >= cost:
             break
         cost, fit, spline, edges = min(tried, key=lambda each: each[0])
+    # of stairs a single edge may be worth nothing: so from all of them, one after another less
+    fewer = _apart(candidates, count)
+    while len(fewer) > 1:
+        whole = best(fewer)
+        if whole[0] < cost and scatter.ends_on(whole[1].residual, fewer):
+            (cost, fit, spline), edges = whole, fewer
+        fewer = min(([i for i in fewer if i != one] for one in fewer), key=lambda some: best(some)[0])
     return fit, spline, sorted(edges), scatter
+
+
+def _apart(candidates: list[int], count: int) -> list[int]:
+    """The highest edges that leave levels which are long enough."""
+    edges = list[int]()
+    for i in candidates:
+        if len(edges) < MOST_JUMPS and are_apart([*edges, i], count):
+            edges.append(i)
+    return edges
 
 
 def _open_ends(

@@ -49,17 +49,19 @@ def possible_jumps(x: FloatArray, z: FloatArray, scale: float) -> IntArray:
 
 def _rises(x: FloatArray, z: FloatArray, scale: float, width: int, side: int) -> list[tuple[float, int]]:
     """How high a profile rises for good over so many places, and after which index the middle of that lies."""
-    rise = z[width:] - z[:-width]
-    off = rise - np.median(rise)
+    from scipy.ndimage import median_filter  # takes longer to import than most profiles to fit
+
+    rise, run = z[width:] - z[:-width], np.maximum(x[width:] - x[:-width], np.finfo(float).tiny)
+    usually = median_filter(rise, size=2 * side + 1, mode="nearest")  # a bent profile rises elsewhere otherwise
+    off, slope = rise - usually, usually / run
     usual = max(robust_scale(off), np.sqrt(2.0) * scale, np.finfo(float).tiny)
-    slope = np.median(np.diff(z) / np.maximum(np.diff(x), np.finfo(float).tiny))
     found = list[tuple[float, int]]()
     for i in sorted(np.flatnonzero(np.abs(off) > JUMP_SDS * usual), key=lambda i: -abs(off[i])):
         middle = int(i) + (width - 1) // 2
         before, after = slice(max(i + 1 - side, 0), i + 1), slice(i + width, i + width + side)
         if min(i + 1, len(z) - i - width) < FEWEST_AT_END or _near(middle, [each for _, each in found], width):
             continue
-        level = np.median(z[after] - slope * x[after]) - np.median(z[before] - slope * x[before])
+        level = np.median(z[after] - slope[i] * x[after]) - np.median(z[before] - slope[i] * x[before])
         if KEPT_SHARE < level / off[i] < 1.0 / KEPT_SHARE:
             found.append((abs(off[i]), middle))
     return found
@@ -78,3 +80,13 @@ def are_apart(edges: list[int], count: int) -> bool:
 def steps_up(edges: list[int], count: int) -> FloatArray:
     """(count, E) columns that are 1 beyond each edge."""
     return (np.arange(count)[:, None] > np.array(edges, dtype=np.int64)[None, :]).astype(np.float64)
+
+
+def told_apart(heights: FloatArray, within: float) -> FloatArray:
+    """(L,) levels of heights over the base, m, the base's own first: those no farther from a lower one than is within
+    the scatter of a place are that one. A profile that comes back to a level does so but for its noise."""
+    levels = [0.0]
+    for height in sorted(heights, key=abs):
+        if min(abs(height - level) for level in levels) > within:
+            levels.append(float(height))
+    return np.array(levels)
