@@ -43,6 +43,8 @@ FREE_AMPLITUDE = 2.0
 OFF_BY = 0.1
 # Bins for each spline, without which it would follow the noise of a few
 BINS_PER_SPLINE = 8
+# Cubic splines are four at least. Whether anything is there the odds ask of so few bins, too: they pay for each spline
+FEWEST_SPLINES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +75,9 @@ def pooled_residual(problem: PosteriorProblem, theta: FloatArray) -> PooledResid
     ways = [each for each in (section, _lengthwise(problem, theta, places) * section.any(axis=0)) if len(each)]
     if not len(section):
         return PooledResidual(1.0, 0.0, False, -np.inf)
+    odds = _free_log_odds(problem, section)
+    if section.any(axis=0).sum() < FEWEST_SPLINES * BINS_PER_SPLINE:
+        return PooledResidual(1.0, 0.0, False, odds)
     residual, slopes = linearised(target, theta)
     fits = []
     for columns in ways:
@@ -82,9 +87,7 @@ def pooled_residual(problem: PosteriorProblem, theta: FloatArray) -> PooledResid
         fits.append((chance, float(np.abs(amplitudes @ columns).max())))
     # each of the two had its chance (Bonferroni)
     chance, worst = min(fits)
-    return PooledResidual(
-        min(1.0, len(fits) * chance), worst, min(fits) is not fits[0], _free_log_odds(problem, section)
-    )
+    return PooledResidual(min(1.0, len(fits) * chance), worst, min(fits) is not fits[0], odds)
 
 
 def with_remark(feature: Feature, pooled: PooledResidual, *, raised: bool) -> Feature:
@@ -141,7 +144,8 @@ def _section(problem: PosteriorProblem, theta: FloatArray) -> tuple[FloatArray, 
     low = -reach if kind.line else 0.0
     inside &= np.abs(away) < reach
     count = min(POOLED_SPLINES if kind.line else POOLED_SPLINES // 2, int(inside.sum()) // BINS_PER_SPLINE)
-    if count < 4:
+    count = max(count, FEWEST_SPLINES)
+    if inside.sum() <= count:
         return np.zeros((0, len(window))), places
     step = (reach - low) / (count - 3)
     knots = low + step * np.arange(-3.0, count + 1.0)

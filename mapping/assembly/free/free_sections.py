@@ -82,13 +82,15 @@ def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[FreeSe
     # over a base with levels, what lies as high for long may be one of them
     share = SHORTEST_LEVEL if levelled else LONGEST_OF_A_ROW
     # what several sweeps feel is judged together once they are linked
-    least = WIDER_THAN_CREST if len(trace.laid_sweeps) == 1 else OF_WIDE_LINE
+    alone = len(trace.laid_sweeps) == 1
+    least = WIDER_THAN_CREST if alone else OF_WIDE_LINE
     for sweep in trace.laid_sweeps:
         left = by_sweep.pop(sweep.number, [])
         if left or levelled:
             between = float(np.median(np.diff(sweep.arclength)))
             for over in sweep.heights(max(between, FINEST * trace.tip_radius)):
-                own, above = of_all_scales(over, trace.tip_radius, share, least), _on_levels(over, trace, least)
+                own = of_all_scales(over, trace.tip_radius, share, least, alone=alone)
+                above = _on_levels(over, trace, least, alone)
                 above = [each for each in above if not any(overlap(each, other) for other in own)]
                 for number, section in enumerate([*own, *above]):
                     inside = [c for c in left if _overlaps(section, c, sweep.trace.t)]
@@ -133,10 +135,13 @@ def free_spot(section: FreeSection, algorithm: int) -> Feature:
     )
 
 
-def _on_levels(piece: SweepHeights, trace: LaidTrace, least: float) -> list[Section]:
+def _on_levels(piece: SweepHeights, trace: LaidTrace, least: float, alone: bool) -> list[Section]:
     """The sections of a piece over the levels that it runs on; none over a base of one level."""
     over = terraced(piece, trace.base, trace.tip_radius).profile
-    return [] if over is piece else of_all_scales(over, trace.tip_radius, LONGEST_OF_A_ROW, least)
+    if over is piece:
+        return []
+    share = LONGEST_OF_A_ROW if alone else SHORTEST_LEVEL
+    return of_all_scales(over, trace.tip_radius, share, least, alone=alone)
 
 
 def _measured(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from mapping import FloatArray
@@ -27,18 +29,31 @@ LEAST_BINS = 8
 FLANK_SDS = 2.5
 
 
+# Half of the width that a ball of a radius feels, at heights, of what it bridges, of a greatest height; all in m
+HalfWidth = Callable[[float, FloatArray, float], FloatArray]
+
+
 def of_all_scales(
-    piece: SweepHeights, tip_radius: float, share: float = SHORTEST_LEVEL, least: float = WIDER_THAN_CREST
+    piece: SweepHeights,
+    tip_radius: float,
+    share: float = SHORTEST_LEVEL,
+    least: float = WIDER_THAN_CREST,
+    *,
+    alone: bool = False,
 ) -> list[Section]:
     """The sections of a piece, up to a share of its length and from `least` times the width of a crest on, each in the
-    finest bins in which it stands clear of their scatter."""
+    finest bins in which it stands clear of their scatter.
+
+    A profile that is alone has hollows from `least` times the width on that the ball would feel of one it hangs in: of
+    a hollow that several sweeps cross families know the ends.
+    """
     longest = share * piece.length
-    found = _sections(piece, tip_radius, longest, least)
+    found = _sections(piece, tip_radius, longest, least, alone)
     piece = piece.coarser()
     while LEAST_BINS * piece.spacing < SHORTEST_LEVEL * piece.length:
         clear = [
             section
-            for section in _sections(piece, tip_radius, longest, least)
+            for section in _sections(piece, tip_radius, longest, least, alone)
             if section.end - section.begin >= LEAST_BINS
         ]
         found += [section for section in clear if not any(overlap(section, other) for other in found)]
@@ -52,7 +67,7 @@ def overlap(one: Section, other: Section) -> bool:
     return bool(begin < stop and start < end)
 
 
-def _sections(piece: SweepHeights, tip_radius: float, longest: float, least: float) -> list[Section]:
+def _sections(piece: SweepHeights, tip_radius: float, longest: float, least: float, alone: bool) -> list[Section]:
     """What stands clear of the usual scatter of a profile, and is wide, up to `longest`, m."""
     z, found = piece.height, []
     smallest = max(neighbour_scatter(z), np.finfo(float).tiny)
@@ -65,9 +80,10 @@ def _sections(piece: SweepHeights, tip_radius: float, longest: float, least: flo
             if begin == 0 or end >= len(z):
                 continue  # what goes on beyond the profile's end is no detail
             section = outlined(piece, sign, int(begin), int(end), usual, longest)
-            if section is None or times_crest(section, tip_radius) <= least:
+            if section is None or (times_bridged if alone else times_crest)(section, tip_radius) <= least:
                 continue
-            if _widest(*_above_flanks(section), 2.0 * FLANK_SDS * usual, tip_radius) > least:
+            half = _half_mouth if alone and sign < 0.0 else _half_crest
+            if _widest(*_above_flanks(section), 2.0 * FLANK_SDS * usual, tip_radius, half) > least:
                 found.append(section)
     return found
 
@@ -104,10 +120,33 @@ def outlined(piece: SweepHeights, sign: float, begin: int, end: int, usual: floa
 def times_crest(section: Section, tip_radius: float) -> float:
     """How many times as wide it was felt as a crest of its height and no width of its own, crossed at a right angle."""
     high = float(section.monotone.max())
-    drop = min((1.0 - FLANK) * high, tip_radius)
-    crest = 2.0 * np.sqrt(drop * (2.0 * tip_radius - drop))
     left, right = flanks(section, FLANK)
-    return float((right.place - left.place) / crest)
+    return float((right.place - left.place) / (2.0 * _half_crest(high, FLANK * high, tip_radius)))
+
+
+def times_bridged(section: Section, tip_radius: float) -> float:
+    """How many times as wide it was felt as what the ball bridges: a crest without a width, or, of a hollow, a mouth
+    that the ball hangs in, whose bottom and flanks it does not touch."""
+    if section.sign > 0.0:
+        return times_crest(section, tip_radius)
+    deep = float(section.monotone.max())
+    hanging = 2.0 * _half_mouth(deep, FLANK * deep, tip_radius)
+    left, right = flanks(section, FLANK)
+    # means over a bin make the cusp that it hangs in wider by up to that, and not as deep
+    return float((right.place - left.place - section.piece.spacing) / hanging)
+
+
+def _half_crest(high: float, at: float | FloatArray, tip_radius: float) -> FloatArray:
+    """Half of the width that a ball feels at heights `at`, m, of a crest of no width of its own, m."""
+    drop = np.clip(high - np.asarray(at), 0.0, tip_radius)
+    return np.asarray(np.sqrt(drop * (2.0 * tip_radius - drop)))
+
+
+def _half_mouth(deep: float, at: float | FloatArray, tip_radius: float) -> FloatArray:
+    """Half of the width that a ball feels at depths `at`, m, of a mouth between whose rims it hangs so deep, m."""
+    least = np.finfo(float).tiny  # in one that is as wide as the ball, or wider, it hangs nowhere
+    half = [np.sqrt(fall * (2.0 * tip_radius - fall)) for fall in (min(deep, tip_radius), np.minimum(at, tip_radius))]
+    return np.asarray(np.maximum(half[0] - half[1], least))
 
 
 def _above_flanks(section: Section) -> tuple[FloatArray, FloatArray]:
@@ -121,8 +160,15 @@ def _above_flanks(section: Section) -> tuple[FloatArray, FloatArray]:
     return np.array([ends[0], *s[first : last + 1], ends[1]]), np.array([level, *z[first : last + 1], level])
 
 
-def _widest(s: FloatArray, z: FloatArray, clear: float, tip_radius: float) -> float:
-    """How many times as wide as a crest the widest is of the details that heights (N,) at places (N,) are of.
+def _widest(
+    s: FloatArray,
+    z: FloatArray,
+    clear: float,
+    tip_radius: float,
+    half: Callable[[float, FloatArray, float], FloatArray],
+) -> float:
+    """How many times as wide as what the ball bridges the widest is of the details that heights (N,) at places (N,)
+    are of.
 
     Where they come down between two tops by more than is `clear` (m), they are of two details: crests side by side, as
     burrs are, are together as wide as one bar, but between them the ball hides what is there.
@@ -131,10 +177,9 @@ def _widest(s: FloatArray, z: FloatArray, clear: float, tip_radius: float) -> fl
     deepest = int(np.argmax(fallen))
     if fallen[deepest] > clear:
         # the bottom lies anywhere in its bin
-        half = 0.25 * (s[deepest + 1] - s[deepest - 1])
-        before, after = np.append(s[:deepest], s[deepest] - half), np.append(s[deepest] + half, s[deepest + 1 :])
+        aside = 0.25 * (s[deepest + 1] - s[deepest - 1])
+        before, after = np.append(s[:deepest], s[deepest] - aside), np.append(s[deepest] + aside, s[deepest + 1 :])
         parts = (before, z[: deepest + 1]), (after, z[deepest:])
-        return max(_widest(*part, clear, tip_radius) for part in parts)
-    drops = np.clip(z.max() - z[[0, -1]], 0.0, tip_radius)
-    crest = float(np.sqrt(drops * (2.0 * tip_radius - drops)).sum())
-    return float(np.ptp(s)) / crest if crest > 0.0 else np.inf
+        return max(_widest(*part, clear, tip_radius, half) for part in parts)
+    bridged = float(half(float(z.max()), z[[0, -1]], tip_radius).sum())
+    return float(np.ptp(s)) / bridged if bridged > 0.0 else np.inf

@@ -70,7 +70,7 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
         if form.masks and np.histogram(x, knots[degree : len(knots) - degree])[0].min() < CELLS_PER_PIECE:
             continue
         splines.append(_Spline(spline_design(x, knots, degree), knots, degree, pieces))
-    best, chosen, edges, scatter = _likeliest(splines, x, z, scale)
+    best, chosen, edges, scatter = _likeliest(splines, x, z, scale, trace.tip_radius)
     knots, degree, pieces = chosen.knots, chosen.degree, chosen.pieces
     heights = np.append(0.0, np.cumsum(best.coefficients[chosen.design.shape[1] :]))
     level = steps_up(edges, len(x)).sum(axis=1).astype(np.int64)
@@ -103,14 +103,14 @@ class _Spline:
 
 
 def _likeliest(
-    splines: list[_Spline], x: FloatArray, z: FloatArray, scale: float
+    splines: list[_Spline], x: FloatArray, z: FloatArray, scale: float, tip_radius: float
 ) -> tuple[RobustFit, _Spline, list[int], Scatter]:
     """The spline with the edges that are worth their price, these, and by which scatter it was judged.
 
     Its further coefficients are the edges' heights.
     """
     count = len(z)
-    candidates = [int(i) for i in possible_jumps(x, z, scale)]
+    candidates = [int(i) for i in possible_jumps(x, z, scale, tip_radius)]
     least = max(scale, LEAST_DIGITS * float(np.abs(z).max()), np.finfo(float).tiny)
     freest = robust_fit(np.hstack([splines[-1].design, steps_up(candidates, count)]), z, least).residual
     span = span_of(robust_fit(splines[0].design, z, least).residual, least)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mapping import FloatArray, IntArray
+from mapping.geometry.templates import contact_half_width
 from mapping.instrument import robust_scale
 
 # Of the length: what keeps to another level for less is a detail of the level beside it, and what is a detail is no
@@ -20,48 +21,50 @@ JUMP_SDS = 6.0
 KEPT_SHARE = 0.5
 # Edges that are looked at, the highest: a staircase has no more levels of the shortest length
 MOST_JUMPS = 7
-# Places that an edge may take: the ball rolls over the edge of a step lower than its radius, and a flank may be
-# slanted. The narrowest over which it rises is taken; an edge wider than that share of half a level is a slope
+# Places that an edge may take, of which the narrowest over which it rises is taken: the ball rolls over the edge of a
+# step on an arc, of which a half of the way makes three quarters of the height. What rises over more is a slope
 WIDTHS_OF_EDGE = (1, 2, 4, 8, 16, 32, 64, 128)
-WIDEST_EDGE = 0.5
 # Places beyond the last edge, or before the first, at least: what is there does not come back, so it is no detail
 # however short it is, and its median bears one place on the edge itself
 FEWEST_AT_END = 3
 
 
-def possible_jumps(x: FloatArray, z: FloatArray, scale: float) -> IntArray:
+def possible_jumps(x: FloatArray, z: FloatArray, scale: float, tip_radius: float) -> IntArray:
     """Indices i between which and i + 1 a profile may step, for good, from one level to another; the highest first.
 
     Args:
         x, z: (N,) the profile in the order of x, m.
         scale: scatter of it from place to place, m.
+        tip_radius: of the ball, m: over an edge it rises on an arc of its own radius.
     """
     side = int(0.5 * SHORTEST_LEVEL * len(z))
     if side < 3:
         return np.zeros(0, dtype=np.int64)
     found = list[tuple[float, int]]()
-    for width in WIDTHS_OF_EDGE[: int(np.searchsorted(WIDTHS_OF_EDGE, WIDEST_EDGE * side, side="right"))]:
+    for width in WIDTHS_OF_EDGE[: int(np.searchsorted(WIDTHS_OF_EDGE, side, side="right"))]:
         narrower = [i for _, i in found]
-        further = [(rise, i) for rise, i in _rises(x, z, scale, width, side) if not _near(i, narrower, width)]
-        found += further
+        rises = _rises(x, z, scale, tip_radius, width, side)
+        found += [(rise, i) for rise, i in rises if not _near(i, narrower, width)]
     return np.array([i for _, i in sorted(found, key=lambda each: -each[0])[: 2 * MOST_JUMPS]], dtype=np.int64)
 
 
-def _rises(x: FloatArray, z: FloatArray, scale: float, width: int, side: int) -> list[tuple[float, int]]:
+def _rises(
+    x: FloatArray, z: FloatArray, scale: float, tip_radius: float, width: int, side: int
+) -> list[tuple[float, int]]:
     """How high a profile rises for good over so many places, and after which index the middle of that lies."""
-    from scipy.ndimage import median_filter  # takes longer to import than most profiles to fit
-
-    rise, run = z[width:] - z[:-width], np.maximum(x[width:] - x[:-width], np.finfo(float).tiny)
-    usually = median_filter(rise, size=2 * side + 1, mode="nearest")  # a bent profile rises elsewhere otherwise
-    off, slope = rise - usually, usually / run
+    rise, run = z[width:] - z[:-width], x[width:] - x[:-width]
+    off = rise - np.median(rise)
     usual = max(robust_scale(off), np.sqrt(2.0) * scale, np.finfo(float).tiny)
+    slope = np.median(np.diff(z) / np.maximum(np.diff(x), np.finfo(float).tiny))
+    arc = contact_half_width(np.minimum(np.abs(off), tip_radius), 0.0, tip_radius)
+    edge = (np.abs(off) > JUMP_SDS * usual) & ((run <= arc) if width > 1 else True)
     found = list[tuple[float, int]]()
-    for i in sorted(np.flatnonzero(np.abs(off) > JUMP_SDS * usual), key=lambda i: -abs(off[i])):
+    for i in sorted(np.flatnonzero(edge), key=lambda i: -abs(off[i])):
         middle = int(i) + (width - 1) // 2
         before, after = slice(max(i + 1 - side, 0), i + 1), slice(i + width, i + width + side)
         if min(i + 1, len(z) - i - width) < FEWEST_AT_END or _near(middle, [each for _, each in found], width):
             continue
-        level = np.median(z[after] - slope[i] * x[after]) - np.median(z[before] - slope[i] * x[before])
+        level = np.median(z[after] - slope * x[after]) - np.median(z[before] - slope * x[before])
         if KEPT_SHARE < level / off[i] < 1.0 / KEPT_SHARE:
             found.append((abs(off[i]), middle))
     return found

@@ -19,7 +19,7 @@ from mapping.inference.families import (
     smooth_pit_beside,
 )
 from mapping.inference.kinds.hollows import Hollow
-from mapping.inference.kinds.points import PointKind, Seen
+from mapping.inference.kinds.points import PointKind, PointShape, Seen
 from mapping.inference.kinds.posterior_density import hollow_priors, place_prior
 
 
@@ -33,6 +33,20 @@ class Pit(Hollow, PointKind):
         start = np.array([0.0] * free + [np.log(2.0 * sizes.radius), np.log(2.0 * sizes.height)])
         step = np.array([0.02 * sizes.half_width] * free + [0.02, 0.05])
         return PitShape(seen.window, seen.spot, seen.tip_radius, free, (*(place,) * free, width, depth), start, step)
+
+    def beginnings(self, shape: PointShape, sizes: Sizes) -> FloatArray:
+        """One on whose floor the ball stands among them: while it hangs, nothing leads to a wider mouth."""
+        others = super().beginnings(shape, sizes)
+        deep = shape.window.height < 0.5 * float(shape.window.height.min(initial=0.0))
+        if not deep.any():
+            return others
+        tip, depth = shape.tip_radius, -float(np.median(shape.window.height[deep]))
+        middle = shape.window.feet[deep].mean(axis=0)
+        half = float(np.linalg.norm(shape.window.feet[deep] - middle, axis=1).max())
+        fall = min(0.5 * depth, tip)  # half as deep as on the floor
+        width = 2.0 * (half + float(np.sqrt(fall * (2.0 * tip - fall))))
+        place = (shape.spot.axes @ (middle - shape.spot.point))[: shape.free]
+        return np.vstack([others, [*place, np.log(width), np.log(depth)]])
 
     def other_starts(self, sizes: Sizes) -> tuple[float, ...]:
         return (float(np.log(sizes.height)),)

@@ -91,9 +91,9 @@ class PointKind(Kind):
 
     def _posed(self, feature: Feature, seen: Seen, around: Surroundings) -> PosteriorProblem:
         shape = self.shape(seen)
-        return pose(feature, seen.sizes, shape, seen.window, around, self._beginnings(shape, seen.sizes))
+        return pose(feature, seen.sizes, shape, seen.window, around, self.beginnings(shape, seen.sizes))
 
-    def _beginnings(self, shape: PointShape, sizes: Sizes) -> FloatArray:
+    def beginnings(self, shape: PointShape, sizes: Sizes) -> FloatArray:
         """Starts that differ in place and in what the first guess knows least."""
         starts = [shape.start]
         for shift in (-0.5, 0.5):
