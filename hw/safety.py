@@ -23,20 +23,43 @@ def end_program(number: int, frame: FrameType | None) -> None:
     """The handler of a signal that ends the program in order: every `with` block is left by an exception.
 
     A compiler, a serialiser or a library that is loading others is not broken off, for it would lose or rename the
-    exception, or crash; the same signal comes again until it is done (a kernel takes some seconds, once).
+    exception, or crash; the same signal comes again until it is done (a kernel takes some seconds, once). It comes
+    again, too, where Python itself loses the exception: in `__del__`, or in the callback of a weak reference.
 
     Raises:
         KeyboardInterrupt: Ctrl-C.
         SystemExit: another signal, with 128 + its number.
     """
     if _calls_back(frame):
-        again = threading.Timer(_AGAIN, _send, (number,))
-        again.daemon = True
-        again.start()
+        _send_again(number)
         return
+    if not isinstance(sys.unraisablehook, _SignalsComeAgain):
+        sys.unraisablehook = _SignalsComeAgain(sys.unraisablehook)
     if number == signal.SIGINT:
         raise KeyboardInterrupt
     raise SystemExit(128 + number)
+
+
+class _SignalsComeAgain:
+    """Python's hook for exceptions that nobody can catch: a signal's is sent again, another is told as before."""
+
+    def __init__(self, before: Callable[[sys.UnraisableHookArgs], Any]) -> None:
+        self._before = before
+
+    def __call__(self, lost: sys.UnraisableHookArgs) -> None:
+        error = lost.exc_value
+        code = 128 + signal.SIGINT if isinstance(error, KeyboardInterrupt) else getattr(error, "code", None)
+        number = next((each for each in SIGNALS if code == 128 + each), None)
+        if number is None:
+            self._before(lost)
+        else:
+            _send_again(number)
+
+
+def _send_again(number: int) -> None:
+    again = threading.Timer(_AGAIN, _send, (number,))
+    again.daemon = True
+    again.start()
 
 
 def _send(number: int) -> None:

@@ -100,3 +100,43 @@ except (KeyboardInterrupt, SystemExit):
 def test_a_signal_is_not_taken_for_a_library_that_is_missing(name: str) -> None:
     ended = subprocess.run([sys.executable, "-c", LOADS, name], cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert (ended.returncode, ended.stdout) == (0, "came\n"), ended.stderr
+
+
+# Python loses what is raised where it clears away, and prints it: without care the program goes on
+CLEARS_AWAY = """
+import os, signal, sys, time, weakref
+from hw import end_program
+number = getattr(signal, sys.argv[1])
+signal.signal(number, end_program)
+def strike(*gone):
+    os.kill(os.getpid(), number)
+class Kept: ...
+class Ends:
+    __del__ = strike
+def referred():
+    kept = Kept()
+    reference = weakref.ref(kept, strike)
+    del kept
+def finalized():
+    weakref.finalize(Kept(), strike)
+came = 0
+for clear_away in (Ends, referred, finalized):
+    try:
+        clear_away()
+        time.sleep(10)
+    except (KeyboardInterrupt, SystemExit) as error:
+        came += 1
+class Wrong:
+    def __del__(self):
+        raise SystemExit(3)
+Wrong()
+print(came, "came")
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_that_python_loses_comes_again_and_what_else_it_loses_is_told(name: str) -> None:
+    command = [sys.executable, "-c", CLEARS_AWAY, name]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert (ended.returncode, ended.stdout) == (0, "3 came\n"), ended.stderr
+    assert ended.stderr.count("Traceback") == 1 and "SystemExit: 3" in ended.stderr
