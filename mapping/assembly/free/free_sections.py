@@ -207,9 +207,10 @@ def _overlaps(section: Section, crossing: Crossing, t: FloatArray) -> bool:
     if not piece.t[0] <= crossing.t <= piece.t[-1]:
         return False
     reach, bins = 2.0 * crossing.half_width / piece.spacing, np.arange(len(piece.t))
-    last = min(max(crossing.stop - 1, crossing.start), len(t) - 1)
-    begin, end = np.interp([t[crossing.start], t[last]], piece.t, bins)
-    at = _bin(piece, crossing)
+    at = begin = end = _bin(piece, crossing)
+    if not crossing.is_step:  # what an edge was compared with are its two terraces, however far they reach
+        last = min(max(crossing.stop - 1, crossing.start), len(t) - 1)
+        begin, end = np.interp([t[crossing.start], t[last]], piece.t, bins)
     return bool(min(begin, at) - reach <= section.end and max(end, at) + reach >= section.begin)
 
 

@@ -37,7 +37,7 @@ class Pit(Hollow, PointKind):
     def beginnings(self, shape: PointShape, sizes: Sizes) -> FloatArray:
         """One on whose floor the ball stands among them: while it hangs, nothing leads to a wider mouth."""
         others = super().beginnings(shape, sizes)
-        deep = shape.window.height < 0.5 * float(shape.window.height.min(initial=0.0))
+        deep = shape.window.height < -0.5 * sizes.height
         if not deep.any():
             return others
         tip, depth = shape.tip_radius, -float(np.median(shape.window.height[deep]))

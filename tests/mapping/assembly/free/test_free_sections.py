@@ -94,6 +94,20 @@ def test_a_wide_detail_may_be_a_large_part_of_its_profile(wide: float) -> None:
     assert found.height.low - 10e-6 < -1e-3 < found.height.high + 10e-6
 
 
+def test_an_edge_is_no_part_of_a_groove_on_its_terrace() -> None:
+    """However far the terrace reaches that it was compared with."""
+    tip, fine = 1e-3, 5e-6
+    grid = fine * np.arange(6000)
+    ball = np.sqrt(tip**2 - (fine * np.arange(-199, 200)) ** 2) - tip
+    body = -1.3e-3 * np.maximum(0.0, 1.0 - np.abs(grid - 7.5e-3) / 2.1e-3) - np.where(grid > 21e-3, 0.8e-3, 0.0)
+    heights = grey_dilation(body, structure=ball, mode="nearest")[::4]
+    heights += 8e-6 * np.random.default_rng(2).standard_normal(len(heights))
+    profile = Trace.from_profile(grid[::4], heights + tip, tip)
+    base = fit_base(profile)
+    found = assemble(detect(profile, base), profile, base)
+    assert sorted(feature.kind for feature in found) == ["pit", "step"]
+
+
 @pytest.mark.parametrize(("depth", "width"), [(1.2e-6, 16e-6), (0.5e-6, 9e-6), (2e-6, 30e-6)])
 @pytest.mark.parametrize("share", [0.04, 0.08])
 def test_a_faint_scratch_is_read_in_bins_as_wide_as_its_noise_asks_for(
