@@ -22,6 +22,9 @@ class PointShape(Shape, Protocol):
     """A shape about a spot: its first `free` parameters are its place in the tangent plane."""
 
     @property
+    def window(self) -> Window: ...
+
+    @property
     def spot(self) -> Spot: ...
 
     @property
