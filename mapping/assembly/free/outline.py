@@ -28,7 +28,6 @@ LEAST_BINS = 8
 # faint sections more are lost, and of the 80 above heights 68 and widths 58 inside instead of 74 and 70; 2 is like 2.5
 FLANK_SDS = 2.5
 
-
 # Half of the width that a ball of a radius feels, at heights, of what it bridges, of a greatest height; all in m
 HalfWidth = Callable[[float, FloatArray, float], FloatArray]
 
@@ -160,13 +159,7 @@ def _above_flanks(section: Section) -> tuple[FloatArray, FloatArray]:
     return np.array([ends[0], *s[first : last + 1], ends[1]]), np.array([level, *z[first : last + 1], level])
 
 
-def _widest(
-    s: FloatArray,
-    z: FloatArray,
-    clear: float,
-    tip_radius: float,
-    half: Callable[[float, FloatArray, float], FloatArray],
-) -> float:
+def _widest(s: FloatArray, z: FloatArray, clear: float, tip_radius: float, half: HalfWidth) -> float:
     """How many times as wide as what the ball bridges the widest is of the details that heights (N,) at places (N,)
     are of.
 

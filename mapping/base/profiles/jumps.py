@@ -22,7 +22,8 @@ KEPT_SHARE = 0.5
 # Edges that are looked at, the highest: a staircase has no more levels of the shortest length
 MOST_JUMPS = 7
 # Places that an edge may take, of which the narrowest over which it rises is taken: the ball rolls over the edge of a
-# step on an arc, of which a half of the way makes three quarters of the height. What rises over more is a slope
+# step on an arc that falls by x^2 / 2 r at x beside its top, so the lower half of the way makes three quarters of the
+# height: one of doubled widths is between a half of the way and all of it. What rises over more is a slope
 WIDTHS_OF_EDGE = (1, 2, 4, 8, 16, 32, 64, 128)
 # Places beyond the last edge, or before the first, at least: what is there does not come back, so it is no detail
 # however short it is, and its median bears one place on the edge itself

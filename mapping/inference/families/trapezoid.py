@@ -23,8 +23,21 @@ from mapping.inference.likelihood import Prior, Uniform, Window
 NARROWEST_PART, WIDEST_PART = 0.01, 4.0
 
 
+class FlatTopped:
+    """Sections with straight flanks, a flat top or none (a roof), which the last parameters of a family describe."""
+
+    roof: bool
+    tip_radius: float
+
+    def parts(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(W,) heights, widths of the top, and runs of a flank, m."""
+        if self.roof:
+            return theta[:, -2], np.zeros(len(theta)), np.exp(theta[:, -1])
+        return theta[:, -3], np.exp(theta[:, -2]), np.exp(theta[:, -1])
+
+
 @dataclass(frozen=True, eq=False)
-class TrapezoidShape:
+class TrapezoidShape(FlatTopped):
     """Lines with a flat top: lateral modes, rounding and places of the ends, height, log width of the top, log run of
     each flank.
 
@@ -78,12 +91,6 @@ class TrapezoidShape:
         """Where edges of the body cut it off."""
         return mouths_of(self.window, self.chart, self.modes, self.tip_radius)
 
-    def parts(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(W,) heights, widths of the top, and runs of a flank, m."""
-        if self.roof:
-            return theta[:, -2], np.zeros(len(theta)), np.exp(theta[:, -1])
-        return theta[:, -3], np.exp(theta[:, -2]), np.exp(theta[:, -1])
-
     @cached_property
     def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         return line_nodes(self.window, self.chart, self.modes, self.tip_radius)
@@ -121,7 +128,7 @@ class ShoulderedShape(TrapezoidShape):
 
 
 @dataclass(frozen=True, eq=False)
-class FrustumShape:
+class FrustumShape(FlatTopped):
     """Bumps with a flat round top: position, height, log width of the top, log run of the flank all round.
 
     A trapezoid turned about its middle, from a disc with upright walls (a run of nothing) to a cone, which has no top.
@@ -147,12 +154,6 @@ class FrustumShape:
     @property
     def units(self) -> tuple[str, ...]:
         return (*("m", "m")[: self.free], "m", *(() if self.roof else ("ln m",)), "ln m")
-
-    def parts(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(W,) heights, widths of the top, and runs of the flank, m."""
-        if self.roof:
-            return theta[:, -2], np.zeros(len(theta)), np.exp(theta[:, -1])
-        return theta[:, -3], np.exp(theta[:, -2]), np.exp(theta[:, -1])
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights over the base's trace, m."""
@@ -193,10 +194,6 @@ class RoundedFrustumShape(FrustumShape):
         """(W, n) heights over the base's trace, m."""
         height, top, shoulder = self.parts(theta)
         return self._turned(theta, top, 0.5 * top[:, None], height[:, None].copy(), shoulder)
-
-
-# Sections with a flat top or straight flanks
-FlatTopped = TrapezoidShape | FrustumShape
 
 
 def trapezoid_beside(ridge: RidgeShape, sizes: Sizes, *, roof: bool) -> TrapezoidShape:

@@ -13,7 +13,6 @@ from mapping.geometry.proxy import Bar, Chain, Part
 from mapping.geometry.templates import chain_height, contact_half_width, radius_of_cap, width_of_cap
 from mapping.inference.families import (
     BumpShape,
-    FlatTopped,
     RidgeShape,
     RoundedFrustumShape,
     ShoulderedShape,
@@ -33,8 +32,9 @@ BEGUN_TAPERS = (-0.4, 0.1, 1.0)
 # Widths of a flat top and runs of a flank, in half-widths of the disturbance, from which their optimum is searched:
 # upright and gentle flanks, tops that are hardly felt and such as fill the disturbance
 FLAT_STARTS = ((0.3, 0.02), (1.0, 0.02), (0.1, 0.6))
-# Run of an upright flank
+# Run of an upright flank: twice the least that is asked for (a hundredth), lest a search begin at the prior's border
 UPRIGHT_RUN = 0.02
+# The same of sections without a top (a steep and a gentle flank), and widths of the top and radii of round edges
 ROOF_STARTS = ((0.02,), (0.6,))
 SHOULDER_STARTS = ((0.3, 0.05), (1.0, 0.05))
 RUNS_OUT = "its flank runs out into the base: width at half height"
@@ -106,7 +106,7 @@ def bell_said(draws: FloatArray) -> Section:
     return Section(Interval.from_draws(draws[:, -3]), width, bell, RUNS_OUT)
 
 
-def flat_topped_said(shape: FlatTopped, draws: FloatArray) -> Section:
+def flat_topped_said(shape: Any, draws: FloatArray) -> Section:
     """What draws (S, P) say of a section with a flat top or straight flanks: its width is that of its foot."""
     height, top, run = shape.parts(draws)
     rounded = isinstance(shape, ShoulderedShape | RoundedFrustumShape)
