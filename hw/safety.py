@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import _thread
 import os
+import queue
 import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any
@@ -30,7 +32,7 @@ def end_program(number: int, frame: FrameType | None) -> None:
         KeyboardInterrupt: Ctrl-C.
         SystemExit: another signal, with 128 + its number.
     """
-    if _calls_back(frame):
+    if _loses_exceptions(frame):
         _send_again(number)
         return
     if not isinstance(sys.unraisablehook, _SignalsComeAgain):
@@ -56,10 +58,23 @@ class _SignalsComeAgain:
             _send_again(number)
 
 
+_to_send: queue.SimpleQueue[int] = queue.SimpleQueue()
+_sender = threading.Thread()  # none yet
+
+
 def _send_again(number: int) -> None:
-    again = threading.Timer(_AGAIN, _send, (number,))
-    again.daemon = True
-    again.start()
+    global _sender
+    _to_send.put(number)
+    if not _sender.is_alive():  # at first, and in a process that was forked off
+        _sender = threading.Thread(target=_keep_sending, name="signals that come again", daemon=True)
+        _sender.start()
+
+
+def _keep_sending() -> None:
+    while True:
+        number = _to_send.get()
+        time.sleep(_AGAIN)
+        _send(number)
 
 
 def _send(number: int) -> None:
@@ -69,8 +84,14 @@ def _send(number: int) -> None:
         _thread.interrupt_main(signal.Signals(number))
 
 
-def _calls_back(frame: FrameType | None) -> bool:
+def _loses_exceptions(frame: FrameType | None) -> bool:
+    """Whether an exception raised here is lost or renamed: compiled code called it, or the hook is sending again.
+
+    On a busy machine the signal may be back before the hook is left, and what a hook raises is printed and gone.
+    """
     while frame is not None:
+        if frame.f_code is _SignalsComeAgain.__call__.__code__:
+            return True
         if frame.f_globals.get("__name__", "").partition(".")[0] in _NOT_TO_BE_BROKEN_OFF:
             return True
         frame = frame.f_back

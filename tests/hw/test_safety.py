@@ -104,7 +104,7 @@ def test_a_signal_is_not_taken_for_a_library_that_is_missing(name: str) -> None:
 
 # Python loses what is raised where it clears away, and prints it: without care the program goes on
 CLEARS_AWAY = """
-import os, signal, sys, time, weakref
+import os, signal, sys, threading, time, weakref
 from hw import end_program
 number = getattr(signal, sys.argv[1])
 signal.signal(number, end_program)
@@ -119,6 +119,12 @@ def referred():
     del kept
 def finalized():
     weakref.finalize(Kept(), strike)
+class Slow(threading.Thread):
+    def start(self):
+        super().start()
+        time.sleep(0.05)
+if sys.argv[2] == "busy machine":
+    threading.Thread = Slow
 came = 0
 for clear_away in (Ends, referred, finalized):
     try:
@@ -134,9 +140,10 @@ print(came, "came")
 """
 
 
+@pytest.mark.parametrize("machine", ["idle machine", "busy machine"])
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-def test_a_signal_that_python_loses_comes_again_and_what_else_it_loses_is_told(name: str) -> None:
-    command = [sys.executable, "-c", CLEARS_AWAY, name]
+def test_a_signal_that_python_loses_comes_again_and_what_else_it_loses_is_told(name: str, machine: str) -> None:
+    command = [sys.executable, "-c", CLEARS_AWAY, name, machine]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert (ended.returncode, ended.stdout) == (0, "3 came\n"), ended.stderr
     assert ended.stderr.count("Traceback") == 1 and "SystemExit: 3" in ended.stderr

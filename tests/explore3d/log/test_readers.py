@@ -230,6 +230,7 @@ def test_inspect_says_gaps_repeats_and_sentinels(tmp_path: Path) -> None:
 
 def test_inspect_counts_in_words_and_gives_zero_no_sign(tmp_path: Path) -> None:
     said = "\n".join(looked(tmp_path, "x [mm];z [mm]\n0;-0\n0.5;-1\n1;-0.0\n2;-2\n").lines())
+    said = said.replace(str(tmp_path), "")  # may hold a -0
     assert "-2 to 0:" in said and "-0" not in said.replace("-0.", "")
     assert "no gaps longer than" in said and "no repeated positions" in said and "(67 % of the steps down)" in said
     one = "\n".join(looked(tmp_path, "x [mm];z [mm]\n1;2\n").lines())
