@@ -7,8 +7,8 @@ import json
 import shlex
 import signal
 import tomllib
-from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Collection
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -87,9 +87,8 @@ def run(
         log, waits = _explore(scene, finger, session, stages, replay)
         stop = stop_of(log)
         session.stopped = stop.text if stop is not None and stop.incomplete else ""
-        with _after_the_sweeps(session):
-            key, base = run_key(log.sha256, Told(force=tuple(force)).record([])), read_base(log.events)
-            analysis = conclude(session, log, scene, base, stages, go_on, report=report, run=key, waits=waits)
+        key, base = run_key(log.sha256, Told(force=tuple(force)).record([])), read_base(log.events)
+        analysis = conclude(session, log, scene, base, stages, go_on, report=report, run=key, waits=waits)
     return replace(analysis, folder=session.place)
 
 
@@ -209,43 +208,30 @@ def _explore(
             return trace
 
         watch = SurveyWatch(execute, log.event)
+        session.reached = lambda error: watch.stop(cause(error)).text
         try:
             outcome = explorer(scene, finger.workspace).go(watch, log.event, watch, waits.meanwhile)
         except BaseException as error:
             if log.samples:
                 stop = watch.stop(cause(error))
-                session.stopped = stop.text
-                error.add_note(stop.text)
                 ended = {"reason": BROKEN_OFF, "cause": stop.cause, "finished": False, "sweeps": stop.sweeps}
                 with suppress(UserError):  # of a full disk, for example: the log then ends without a word
                     log.event(OUTCOME, ended)
             raise
         finally:
             waits.ended()
-        with _after_the_sweeps(session):
-            if replay is not None:
-                replay.rest(log.write)
-            ended = _ended(outcome, watch, scene, cut_short, getattr(finger, "lost", None))
-            # what the connection counted and learnt of its clocks on the way
-            log.event(OUTCOME, ended | {"finger": finger.info})
-            if not log.samples:
-                why = watch.refused or outcome.detail or outcome.reason
-                raise UserError(f"{session.folder}: nothing was felt: {why}")
-            session.settle()
-            log.close()  # its digest goes into the model
-            return log.recorded(), waits
-
-
-@contextmanager
-def _after_the_sweeps(session: Session) -> Iterator[None]:
-    """Whatever ends a session in here, its samples are all there: that is said."""
-    try:
-        yield
-    except BaseException as error:
-        if session.holds_samples:
-            session.stopped = session.stopped or f"stopped after all sweeps, before the report: {cause(error)}"
-            error.add_note(session.stopped)
-        raise
+        session.reached = lambda error: f"stopped after all sweeps, before the report: {cause(error)}"
+        if replay is not None:
+            replay.rest(log.write)
+        ended = _ended(outcome, watch, scene, cut_short, getattr(finger, "lost", None))
+        # what the connection counted and learnt of its clocks on the way
+        log.event(OUTCOME, ended | {"finger": finger.info})
+        if not log.samples:
+            why = watch.refused or outcome.detail or outcome.reason
+            raise UserError(f"{session.folder}: nothing was felt: {why}")
+        session.settle()
+        log.close()  # its digest goes into the model
+        return log.recorded(), waits
 
 
 def _ended(

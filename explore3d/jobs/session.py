@@ -16,7 +16,7 @@ import shutil
 import signal
 import tempfile
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -67,8 +67,8 @@ class Session:
 
     The folder may be new, empty, or hold an earlier session; that stays as it is, bit for bit, until this one is whole.
     Files that are nobody's session stay where they are. Files appear whole: they are written beside their place and
-    renamed. If the block ends in an error, the log is kept if it holds a sample, and the error gets a note saying where
-    it is and how to go on; else everything is as it was before.
+    renamed. If the block ends in an error, the log is kept if it holds a sample, and the error gets notes saying how
+    far the job was (`reached`), where the log is and how to go on; else everything is as it was before.
 
     Args:
         folder: where the results belong.
@@ -96,6 +96,9 @@ class Session:
         self.job = Job() if job is None else job
         self.source: Path | None = None
         self.stopped = ""
+        # How far the job is when an error ends it, in words. Asked on leaving, whatever the job was at: a signal may
+        # come between any two of its statements
+        self.reached: Callable[[BaseException], str] = lambda error: ""
         self._keep = {Path(path).resolve() for path in keep}
         self._overwrite, self._resume = overwrite, resume
         self._earlier: dict[str, Any] | None = None
@@ -346,6 +349,10 @@ class Session:
             if not isinstance(error, Exception) or isinstance(error, OSError):  # a signal, or the disk
                 error.add_note(self._kept())
             return
+        if self._log is not None and self._log.samples:
+            self.stopped = self.stopped or self.reached(error)
+        if self.stopped:
+            error.add_note(self.stopped)
         error.add_note(self._kept())
         with suppress(OSError):  # a full disk: a session that says "running" and is not locked ended early, too
             self._mark("stopped")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import random
@@ -10,7 +11,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 from scene_files import write_scene_file
@@ -18,7 +19,7 @@ from scene_files import write_scene_file
 from explore3d.analysis.result import Analysis
 from explore3d.jobs.analyze import analyze
 from explore3d.jobs.run import run
-from explore3d.log import Log, Recorder, read_log, read_noise
+from explore3d.log import Recorder, read_log, read_noise
 from explore3d.log.own import MAGIC
 from explore3d.scene import AnalysisSettings
 
@@ -145,11 +146,18 @@ def test_a_bare_tile_has_no_feature_and_costs_no_chain(tmp_path: Path) -> None:
     assert "posterior" not in analysis.timings
 
 
-def test_whatever_ends_a_run_after_its_sweeps_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(log: Recorder) -> Log:
+@pytest.mark.parametrize("at", ["recorded", "stop_of", "conclude"])
+def test_whatever_ends_a_run_after_its_sweeps_it_says_so(
+    at: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While the log is closed, between exploration and analysis, and in the analysis."""
+
+    def interrupted(*given: object, **options: object) -> NoReturn:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Recorder, "recorded", interrupted)
+    monkeypatch.setattr(
+        Recorder if at == "recorded" else importlib.import_module("explore3d.jobs.run"), at, interrupted
+    )
     with pytest.raises(KeyboardInterrupt) as ended:
         run(write_scene(tmp_path, "tile", truth=""), tmp_path / "out")
     said, kept = ended.value.__notes__
