@@ -22,6 +22,7 @@ from mapping.assembly.runs import along, split_runs, told_crests
 from mapping.base import Base, LaidTrace
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import distances
+from mapping.geometry.templates import SHAPE_ERROR
 from mapping.inference.configuration import PROPOSALS, Places, Proposal, accounted, is_two
 from mapping.inference.families import Surroundings
 from mapping.inference.kinds import kind_made_of
@@ -29,6 +30,8 @@ from mapping.inference.kinds import kind_made_of
 # A crossing lower than this share of its group's is an outlier if it lies so many half-widths off the others, and so
 # many from any other low one; where others are so many that they are a line, not a spot with low rims.
 STRAY, STRAY_DISTANCE, MATES, LINE = 0.6, 1.3, 3.0, 5
+# Half-widths beside a crest in which its shape may be wrong: as far again as a sharp one disturbs
+MISFIT_REACH = 2.0
 
 
 def assemble(
@@ -266,9 +269,18 @@ def _strongest_first(features: Sequence[Feature]) -> tuple[Feature, ...]:
 
 
 def _scale(crossings: Sequence[Crossing], tip_radius: float) -> float:
-    """Half-width of a sharp crest of the typical height, m."""
+    """Half-width of a sharp crest of the typical height, m: the median, of crossings that are details of their own.
+
+    Where nothing is noise, what a crest's own shape is wrong by is detected beside it, too, some nanometres high.
+    """
     heights = np.array([abs(c.height) for c in crossings])
-    return float(np.sqrt(2 * tip_radius * np.median(heights)))
+    points = np.array([c.point for c in crossings])
+    own = np.ones(len(crossings), dtype=bool)
+    for k in np.flatnonzero(heights < SHAPE_ERROR * heights.max()):
+        reach = MISFIT_REACH * np.sqrt(2.0 * tip_radius * heights)
+        beside = np.linalg.norm(points - points[k], axis=1) < reach
+        own[k] = not (beside & (SHAPE_ERROR * heights > heights[k])).any()
+    return float(np.sqrt(2 * tip_radius * np.median(heights[own])))
 
 
 def _without_shadows(features: list[Feature], tip_radius: float) -> list[Feature]:

@@ -211,7 +211,7 @@ def _course_of(axes: list[FloatArray], half_width: float) -> tuple[FloatArray, l
     course, used, last = pieces[longest], [longest], [longest, longest]  # the pieces that it begins and ends with
     while True:
         left = [k for k in range(len(pieces)) if k not in used]
-        beside = [k for k in left if np.median(distances(pieces[k], course)) < half_width]
+        beside = [k for k in left if _runs_beside(pieces[k], course, half_width)]
         if beside:
             used += beside
             continue
@@ -229,6 +229,15 @@ def _course_of(axes: list[FloatArray], half_width: float) -> tuple[FloatArray, l
         course = onward if at else onward[::-1]
         used.append(nearest)
         last[at] = nearest
+
+
+def _runs_beside(piece: FloatArray, course: FloatArray, reach: float) -> bool:
+    """True of a point so near (m) to a course (K, 3), and of a line (M, 3) most of which is, but not beyond an end."""
+    nearest, along = nearest_on(piece, course)
+    away = np.linalg.norm(piece - nearest, axis=1)
+    if len(piece) > 1:
+        away[(along <= 0.0) | (along >= arclengths(course)[-1])] = np.inf
+    return bool(np.median(away) < reach)
 
 
 def _evenly(axis: FloatArray) -> FloatArray:
@@ -571,13 +580,15 @@ class Proposal:
     of: Callable[[Configuration, FloatArray], Iterator[Parts]]
 
 
-JOIN = Proposal("join", lambda now, points: itertools.chain(chained(now), joined(now)))
+ONE_COURSE = Proposal("one course", lambda now, points: chained(now))
+JOIN = Proposal("join", lambda now, points: joined(now))
 REMOVE = Proposal("remove", lambda now, points: without(now))
 PROPOSALS = (
     Proposal("section", lambda now, points: sections(now)),
     Proposal("smoother", lambda now, points: smoother(now)),
     Proposal("straight lines", straight),
     Proposal("ring", ringed),
+    ONE_COURSE,
     JOIN,
     Proposal("apart", lambda now, points: apart(now)),
     Proposal("move", lambda now, points: moved(now)),

@@ -10,7 +10,7 @@ import numpy as np
 from mapping import FloatArray, MappingError
 from mapping.inference.configuration.configuration import Configuration, Part, fitted, laid
 from mapping.inference.configuration.neighbourhood import Neighbourhood
-from mapping.inference.configuration.proposals import JOIN, PROPOSALS, REMOVE, Parts, Proposal
+from mapping.inference.configuration.proposals import JOIN, ONE_COURSE, PROPOSALS, REMOVE, Parts, Proposal
 
 # Details that are weighed at once, each of so many parameters, and places that so many are weighed on (see `account`):
 # one fit of them takes one to two CPU seconds. Its time grows with the places, and with the parameters, each of which
@@ -84,23 +84,27 @@ def searched(
             parts = [parts[k] for k in kept]
             visited[best.kinds] = best
             accepted.append(REMOVE.name)
-    whole, joining = laid(parts, place), True
+    whole, joining, joiners = laid(parts, place), True, [each for each in (ONE_COURSE, JOIN) if each in proposals]
     # pieces of one line hide each other once they are fitted: they are joined as the rules left them, those first that
-    # gain most by it: both flanks of a wide line may be one step to some extent, and no longer a line after that
+    # gain most by it: both flanks of a wide line may be one step to some extent, and no longer a line after that. Where
+    # all pieces are one course that leaves no more than noise no pairs of them are tried
     while joining and not spent.enough:
         joining = False
-        for other_parts in _yielded(JOIN, whole, points) if JOIN in proposals else ():
-            if spent.all_work:
-                bounded = True
+        for proposal in joiners:
+            if joining and len(best.parts) == 1 and best.fits:
                 break
-            other = fitted(other_parts, place)
-            spent.on(other_parts, place)
-            if other is not None and other.log_odds > best.log_odds + WORTH:
-                best, joined, joining = other, laid(other_parts, place), True
+            for other_parts in _yielded(proposal, whole, points):
+                if spent.all_work:
+                    bounded = True
+                    break
+                other = fitted(other_parts, place)
+                spent.on(other_parts, place)
+                if other is not None and other.log_odds > best.log_odds + WORTH:
+                    best, joined, joining, joiner = other, laid(other_parts, place), True, proposal
         if joining:
             whole = joined
             visited[best.kinds] = best
-            accepted.append(JOIN.name)
+            accepted.append(joiner.name)
     while idle < len(proposals):
         for proposal in proposals:
             found = best

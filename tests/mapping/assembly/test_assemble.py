@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mapping.assembly.assemble import assemble
+from mapping.assembly.assemble import assemble, place_spacing
 from mapping.base.base import Base
+from mapping.detection.crossing import Crossing
 from mapping.detection.detect import detect
 from mapping.geometry.templates.shapes import chain_height, rim_height, step_height
 from mapping.surface import Surface
@@ -189,3 +190,18 @@ def test_two_ridges_that_cross_are_two_ridges():
     assert all("junction" in f.notes for f in found)
     lengths = sorted(f.length.median for f in found)
     np.testing.assert_allclose(lengths, [np.hypot(0.022, 0.06), np.hypot(0.06, 0.04)], atol=3e-3)
+
+
+def test_what_an_exact_trace_shows_of_a_shapes_own_error_says_nothing_of_the_typical_height() -> None:
+    def crossing(x: float, height: float) -> Crossing:
+        half_width = float(np.sqrt(2.0 * TIP * abs(height)))
+        place = np.array([x, 0.0, 0.0])
+        return Crossing(0, 0.0, place, NORMAL, np.array([1.0, 0.0, 0.0]), "concave", height, 1e-12, 1e-6, half_width,
+                        1.0, 1e6, True, 0, 1)  # fmt: skip
+
+    groove = [crossing(0.004 * k, -1.5e-4) for k in range(5)]
+    ripple = [crossing(0.002 + 1e-4 * k, -1e-9) for k in range(12)]
+    assert place_spacing([*groove, *ripple], TIP) == place_spacing(groove, TIP)
+    # farther than what a groove disturbs they are details of their own
+    alone = [crossing(1.0 + 1e-4 * k, -1e-9) for k in range(12)]
+    assert place_spacing([*groove, *alone], TIP) < 0.01 * place_spacing(groove, TIP)

@@ -41,7 +41,15 @@ from mapping.inference.configuration.configuration import (
     part_of,
 )
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood, window_of
-from mapping.inference.configuration.proposals import as_point, chained, joined, smoother, straight, straight_lines
+from mapping.inference.configuration.proposals import (
+    _course_of,
+    as_point,
+    chained,
+    joined,
+    smoother,
+    straight,
+    straight_lines,
+)
 from mapping.inference.configuration.search import searched
 from mapping.inference.families import Crossing, SmoothGrooveShape, Surroundings
 from mapping.inference.joint import JoinedShape
@@ -285,6 +293,18 @@ def test_pieces_are_one_course_where_they_are_nearest_and_what_runs_beside_it_le
     for whole in wholes:
         np.testing.assert_allclose(sorted(whole.feature.axis[[0, -1], 0]), sorted([start[0], stop[0]]), atol=1e-4)
         assert abs(_length(whole.feature) - 2.0 * half) < 1e-4
+
+
+def test_pieces_shorter_than_they_are_felt_apart_go_on_where_the_last_one_ends() -> None:
+    turn = np.linspace(0.0, np.pi, 9)
+    arc = 14e-3 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    pieces = [arc[k : k + 2] for k in (3, 0, 6, 4, 1, 7, 2, 5)]  # of 5.5 mm, felt 3.6 mm to either side
+    course, used = _course_of(pieces, 3.6e-3)
+    assert sorted(used) == list(range(8))
+    np.testing.assert_allclose(sorted(course[[0, -1], 0]), [-14e-3, 14e-3], atol=1e-9)
+    # what lies beside the middle of a piece leads nowhere
+    course, used = _course_of([*pieces, 0.8 * arc[4:6]], 3.6e-3)
+    assert len(used) == 9 and abs(np.linalg.norm(np.diff(course, axis=0), axis=1).sum() - 43.7e-3) < 2e-4
 
 
 def _length(feature: Feature) -> float:
