@@ -18,6 +18,7 @@ from explore3d.report.findings import (
     misfit_warnings,
     number_text,
     numbers_found,
+    open_number_warnings,
     path_sentence,
     path_warning,
     stop_lines,
@@ -119,7 +120,8 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
         content.extend([element("p", warning, class_="warning")] if warning else [])
         content.append(paragraph(analysis.account.sentence()))
     content.extend(element("p", each, class_="warning") for each in form_warnings(analysis))
-    content.extend(element("p", each, class_="warning") for each in misfit_warnings(analysis))
+    wrong = [*misfit_warnings(analysis), *open_number_warnings(analysis)]
+    content.extend(element("p", each, class_="warning") for each in wrong)
     content.extend(element("p", each, class_="warning") for each in dropped_warning(analysis))
     if analysis.path is not None:
         kind = "warning" if path_warning(analysis) else ""

@@ -23,7 +23,7 @@ from mapping import Feature, FloatArray, Interval, Support
 from mapping.assembly import assemble
 from mapping.base import LaidTrace
 from mapping.detection import detect
-from mapping.inference.configuration import PROPOSALS, numbers_in
+from mapping.inference.configuration import NUMBER_OPEN, PROPOSALS, numbers_in
 from mapping.inference.kinds import feature_trace, kind_made_of
 
 # Sweeps over a square of twice this, m, one pitch apart; details stay inside by the margin
@@ -44,7 +44,8 @@ DECILES = np.linspace(0.0, 1.0, 11)
 class CountCase:
     """One plate: how many details it bears that leave a trace, and the probability that was stated of each number.
 
-    `without` names the proposal that was not made.
+    `without` names the proposal that was not made. `left_open` is True if it is said of some details that they do not
+    explain what was felt: no probability is stated then, and `stated` holds how many were told.
     """
 
     seed: int
@@ -52,6 +53,7 @@ class CountCase:
     stated: dict[int, float]
     seconds: float
     without: str = ""
+    left_open: bool = False
 
 
 def run_counts(seed: int, without: str = "") -> CountCase:
@@ -77,7 +79,8 @@ def run_counts(seed: int, without: str = "") -> CountCase:
     laid = LaidTrace.of(trace, base)
     proposals = [proposal for proposal in PROPOSALS if proposal.name != without]
     features = assemble(detect(laid, base), laid, base, proposals=proposals)
-    return CountCase(seed, true, stated_counts(features), time.process_time() - start, without)
+    seconds, left_open = time.process_time() - start, any(NUMBER_OPEN in feature.notes for feature in features)
+    return CountCase(seed, true, stated_counts(features), seconds, without, left_open)
 
 
 def drawn(rng: np.random.Generator, others: Sequence[Feature] = ()) -> Feature:
@@ -140,10 +143,14 @@ def load_counts(store: Path) -> list[CountCase]:
 
 
 def counts_table(cases: Sequence[CountCase], line: Callable[[str], None]) -> None:
-    """Print how often a number was true that was stated with a probability in each decile, and the errors by number."""
+    """Print how often a number was true that was stated with a probability in each decile, and the errors by number.
+
+    Plates whose number was left open count among the errors alone.
+    """
     stated = [
         OddsCase("number", case.seed, number == case.true, _log_odds(case.stated.get(number, 0.0)))
         for case in cases
+        if not case.left_open
         for number in sorted({*case.stated, case.true})
     ]
     for row in reliability(stated, DECILES):
@@ -154,10 +161,17 @@ def counts_table(cases: Sequence[CountCase], line: Callable[[str], None]) -> Non
     likeliest = [max(case.stated.items(), key=lambda one: one[1])[0] for case in cases]
     right = sum(most == case.true for most, case in zip(likeliest, cases, strict=True))
     fewer = sum(most < case.true for most, case in zip(likeliest, cases, strict=True))
+    took = np.mean([case.seconds for case in cases])
     line(
         f"{len(cases)} plates: the likeliest number is right in {right}, too low in {fewer}, too high in "
-        f"{len(cases) - right - fewer}; {np.mean([case.seconds for case in cases]):.2f} CPU s a plate"
+        f"{len(cases) - right - fewer}; {_open_text(cases, likeliest)}; {took:.2f} CPU s a plate"
     )
+
+
+def _open_text(cases: Sequence[CountCase], likeliest: Sequence[int]) -> str:
+    """ "in 3 it is left open, of which 1 is right"."""
+    left = [most == case.true for most, case in zip(likeliest, cases, strict=True) if case.left_open]
+    return f"in {len(left)} it is left open, of which {sum(left)} right"
 
 
 def _log_odds(p: float) -> float:

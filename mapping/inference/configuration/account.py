@@ -61,6 +61,10 @@ MOST_OF_A_SPOT = 0.5
 # Draws of the Gaussian that preliminary intervals are taken from
 PRELIMINARY_DRAWS = 400
 ENDED_EARLY = "the search for what is felt here, and what beside it, ended before all was tried"
+# What is said where the likeliest configuration leaves more than noise. Of 200 plates with up to five details (`bench
+# odds --counts --building`, seeds 1100 to 1299) the likeliest number was right in 68 of 91 whose configuration fits, in
+# 13 of 42 where it does not
+NUMBER_OPEN = "more is felt here than these explain: how many there are is open"
 NOT_WEIGHED = "so many places tell of it that it was not asked what else it may be"
 # What is said of more details, or of more places that tell of some, than are weighed at once
 IN_BLOCKS = "more is felt together here than is weighed at once: the details beside were held"
@@ -235,7 +239,8 @@ def _improved(
     ]
     found = searched(start, parts, np.array(points).reshape(-1, 3), proposals)
     odds = _told(found)
-    noted = (ENDED_EARLY,) if found.bounded else ()
+    noted = (*((ENDED_EARLY,) if found.bounded else ()), *(() if found.best.fits else (NUMBER_OPEN,)))
+    odds = odds if found.best.fits else ()  # among configurations that are all wrong none is probable
     # a section or a course alone is the posterior's to choose
     adds = len(found.best.kinds) > len(found.start.kinds)
     if (adds and not found.best.fits and not _pays_beside_misfit(found)) or (
@@ -243,7 +248,7 @@ def _improved(
     ):
         laid = _bent_as_fitted(group, found.start, around)
         felt = [_felt_by_runs(feature, found.start.runs(k)) for k, feature in enumerate(laid)]
-        return [_with_odds(feature, odds if found.best.fits else (), noted) for feature in felt], found.best
+        return [_with_odds(feature, odds, noted) for feature in felt], found.best
     algorithms = group[0].evidence.algorithms if group else ()
     features = [_with_odds(feature, odds, noted) for feature in _described(found.best, around, algorithms)]
     return _meeting(features, around.trace.tip_radius), found.best

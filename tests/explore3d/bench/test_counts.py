@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from explore3d.bench.posterior import bench_counts, counts_table
-from explore3d.bench.posterior.counts import CountCase, drawn, stated_counts
+from explore3d.bench.posterior.counts import CountCase, drawn, run_counts, stated_counts
 from explore3d.bench.scenes import FIRST_BUILT_WITH
 
 ACCOUNT = (("two ridges", 0.8), ("one ridge", 0.2))
@@ -40,3 +40,13 @@ def test_the_table_holds_stated_numbers_against_true_ones() -> None:
     assert "stated  20 to  30 %:     4 numbers, mean  25.0 %, came true  25.0 %" in lines[0]
     assert "stated  70 to  80 %:     4 numbers, mean  75.0 %, came true  75.0 %" in lines[1]
     assert lines[-1].startswith("4 plates: the likeliest number is right in 3, too low in 0, too high in 1")
+
+
+def test_a_number_that_the_trace_contradicts_is_left_open() -> None:
+    case = run_counts(FIRST_BUILT_WITH + 70)  # three details, told as one bump
+    assert case.left_open and case.true not in case.stated
+    assert not run_counts(FIRST_BUILT_WITH + 3).left_open
+    lines: list[str] = []
+    counts_table([case, CountCase(1, 2, {2: 0.95, 1: 0.05}, 1.0)], lines.append)
+    assert not any("came true   0.0 %" in line and "stated  90" in line for line in lines)
+    assert "too low in 1, too high in 0; in 1 it is left open, of which 0 right" in lines[-1]

@@ -13,6 +13,7 @@ from mapping import Dropped, Posterior, place_text
 from mapping.detection.path import PathLedger
 from mapping.estimate.envelope import RefutedTip
 from mapping.feature import Interval
+from mapping.inference.configuration import NUMBER_OPEN
 
 
 def feature(name: str, finer: bool, length: Interval) -> SimpleNamespace:
@@ -24,6 +25,7 @@ def feature(name: str, finer: bool, length: Interval) -> SimpleNamespace:
         width=Interval(1e-3, 1e-3, 1e-3),
         length=length,
         details=SimpleNamespace(misfit=None, account=()),
+        notes=(),
         posterior=None,
         log_odds=None,
     )
@@ -242,3 +244,11 @@ def test_a_doubt_of_the_tip_that_was_assumed_is_said() -> None:
     said = summary(found)[-1]
     assert said.startswith("The tip's radius is 10 mm as stated. How well it is known was not stated")
     assert "± 0.1 mm (1 %) is assumed" in said
+
+
+def test_an_open_number_is_a_warning_unless_the_features_own_form_is_what_is_wrong() -> None:
+    ridge, groove = (feature(name, True, Interval(0.01, 0.01, 0.01)) for name in ("ridge-1", "groove-1"))
+    ridge.notes = groove.notes = (NUMBER_OPEN,)
+    groove.details.misfit = "no ideal groove fits"
+    said = warnings(analysis(ridge, groove))
+    assert [each for each in said if NUMBER_OPEN in each] == [f"Warning: ridge-1: {NUMBER_OPEN}."]
