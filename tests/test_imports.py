@@ -82,6 +82,12 @@ def home(folder: str, name: str) -> str | None:
     return (home(given, name) or given) if given in modules() and is_folder(given) else given
 
 
+@cache
+def imports_in(module: str) -> tuple[tuple[ast.Import | ast.ImportFrom, str], ...]:
+    """A module's import statements, and when they are carried out."""
+    return tuple(statements(tree(module)))
+
+
 def statements(node: ast.AST, when: str = "top") -> Iterator[tuple[ast.Import | ast.ImportFrom, str]]:
     """Import statements below a node, and when they are carried out."""
     for child in ast.iter_child_nodes(node):
@@ -102,7 +108,7 @@ def imports() -> tuple[Import, ...]:
     """Every import of ours by ours, those inside functions and of type checkers included."""
     found = []
     for module in modules():
-        for node, when in statements(tree(module)):
+        for node, when in imports_in(module):
             if isinstance(node, ast.Import):
                 named = [(alias.name, alias.name) for alias in node.names]
             else:
@@ -117,10 +123,11 @@ def imports() -> tuple[Import, ...]:
     return tuple(found)
 
 
+@cache
 def outside(module: str, when: str = "top") -> set[str]:
     """Packages of others that a module imports when it is imported."""
     names = set()
-    for node, moment in statements(tree(module)):
+    for node, moment in imports_in(module):
         if moment == when:
             full = [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module or ""]
             names |= {name.split(".")[0] for name in full}
@@ -128,19 +135,26 @@ def outside(module: str, when: str = "top") -> set[str]:
 
 
 @cache
-def loads(module: str) -> frozenset[str]:
-    """Packages of others that are loaded when a module of ours is imported, by way of ours too."""
-    after = defaultdict(set)
+def loaded_next() -> dict[str, set[str]]:
+    """Modules of ours that each one loads when it is imported."""
+    after: dict[str, set[str]] = defaultdict(set)
     for each in imports():
         if each.when == "top" and not is_folder(each.file):
             after[each.file].add(each.target)
+    return after
+
+
+@cache
+def loads(module: str) -> frozenset[str]:
+    """Packages of others that are loaded when a module of ours is imported, by way of ours too."""
+    after = loaded_next()
     seen: set[str] = set()
     waiting = [module]
     while waiting:
         here = waiting.pop()
         if here not in seen:
             seen.add(here)
-            waiting += after[here]
+            waiting += after.get(here, ())
     return frozenset().union(*(outside(each) for each in seen))
 
 
@@ -214,7 +228,7 @@ def test_no_folder_holds_more_than_a_person_keeps_in_mind() -> None:
 
 @pytest.mark.parametrize("folder", [m for m in modules() if is_folder(m) and gives(m)])
 def test_a_doorway_says_the_same_to_people_to_type_checkers_and_at_run_time(folder: str) -> None:
-    typed = {alias.name for node, when in statements(tree(folder)) if when == "typing" for alias in node.names}
+    typed = {alias.name for node, when in imports_in(folder) if when == "typing" for alias in node.names}
     assert typed == set(gives(folder))
     door = importlib.import_module(folder)
     assert set(door.__all__) == set(gives(folder))

@@ -184,7 +184,7 @@ def felt() -> Log:
 
 def concluded(scene: Scene) -> Any:
     """What the analysis of one sweep says."""
-    corners = 0.02 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+    corners = 6e-3 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
     analysis = build_model(felt(), scene, Base(Surface(corners, np.array([[0, 1, 2], [0, 2, 3]]))), Stages())
     return told((analysis.title, analysis.truth, analysis.judgements))
 

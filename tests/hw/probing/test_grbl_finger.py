@@ -139,7 +139,8 @@ def test_a_locked_machine_is_refused_with_the_remedy_and_unlocked_only_when_told
         assert stage.state == "Idle"
 
 
-def test_whoever_holds_the_machine_is_told_that_it_waits_for_him() -> None:
+def test_whoever_holds_the_machine_is_told_that_it_waits_for_him(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hw.grbl.controller.SHORTEST_TOLD_HOLD", 0.3)
     told: list[str] = []
     with machine() as (server, stage), pecker(server) as finger:
         whole = len(finger.execute(across(x=0.005)))
@@ -376,7 +377,7 @@ def test_leaving_lifts_the_tip_off_and_frees_the_port_even_after_an_error() -> N
 
 
 def test_an_alarm_ends_the_sweep_keeps_its_samples_and_moves_nothing_more() -> None:
-    with machine(pace=3.0) as (server, stage), pecker(server) as finger:
+    with machine(pace=10.0) as (server, stage), pecker(server) as finger:
         told: list[Trace] = []
 
         def trip(batch: Trace) -> None:

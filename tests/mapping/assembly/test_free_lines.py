@@ -56,7 +56,7 @@ def bead(x: FloatArray, y: FloatArray) -> FloatArray:
     ("form", "kind", "height", "width"),
     [
         (scratch, "groove", -1.2e-6, 16e-6),
-        (slot, "groove", -1.5e-6, 19.6e-6),
+        pytest.param(slot, "groove", -1.5e-6, 19.6e-6, marks=pytest.mark.slow),
         pytest.param(bead, "ridge", 1e-6, 23e-6, marks=pytest.mark.slow),
     ],
 )

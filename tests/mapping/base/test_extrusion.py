@@ -61,7 +61,9 @@ BODIES = {
 }
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name == "roof" else ()) for name in BODIES]
+)
 def test_a_section_along_a_line_is_found_to_the_noise_of_its_mean(name: str) -> None:
     bends, begin = BODIES[name]
     section = path_over(bends, begin)

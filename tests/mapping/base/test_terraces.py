@@ -33,7 +33,9 @@ def levels(base: Base) -> list[float]:
     return sorted(float(value) for value in found if isinstance(value, float))
 
 
-@pytest.mark.parametrize("height", [0.05e-3, 0.3e-3, 2e-3, 4e-3, 12e-3])
+@pytest.mark.parametrize(
+    "height", [0.05e-3, 4e-3, 12e-3, *(pytest.param(height, marks=pytest.mark.slow) for height in (0.3e-3, 2e-3))]
+)
 def test_a_plate_with_a_step_is_a_plane_on_two_levels(height: float) -> None:
     base = fit_base(raster(lambda u, v: step_height(u - EDGE, height, TIP)))
     assert base.kind == "plane"

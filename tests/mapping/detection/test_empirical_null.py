@@ -98,7 +98,7 @@ def test_what_lies_in_the_middle_of_every_sweep_is_not_taken_for_noise(monkeypat
     assert noise.white < 1e-6 * TIP and noise.correlated == 0.0
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_where_most_of_the_path_lies_on_wires_the_noise_is_that_of_the_rest(seed: int) -> None:
     """As of a finger that explores: some sweeps all over a plate, and many short ones across a wire."""
     rng, step, noise = np.random.default_rng(seed), 50e-6, 0.2e-3

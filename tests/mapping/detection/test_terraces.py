@@ -39,7 +39,7 @@ def places(detections: Detections, *kinds: str) -> list[list[float]]:
     return [sorted(float(c.point[0]) for c in own) for own in of]
 
 
-@pytest.mark.parametrize("height", [0.05e-3, 0.3e-3, 2e-3])
+@pytest.mark.parametrize("height", [0.05e-3, pytest.param(0.3e-3, marks=pytest.mark.slow), 2e-3])
 def test_every_line_crosses_the_step_and_nothing_else(height: float) -> None:
     detections = found(lambda x: step_height(x - 3.3e-3, height, TIP))
     assert len(detections.crossings) == LINES

@@ -40,6 +40,10 @@ def trace(
     return np.asarray(out[0])
 
 
+def places_between(low: float, high: float, count: int) -> FloatArray:
+    return np.linspace(low, high, count if high > low else 1)
+
+
 def dilated(u: FloatArray, s: FloatArray, corners: list[tuple[float, float]], tip: float, rounded: float) -> FloatArray:
     """The same by trying all points of the body: of its top, its sides, its end, and the corners between them."""
     x, z = zip(*corners, strict=True)
@@ -49,9 +53,9 @@ def dilated(u: FloatArray, s: FloatArray, corners: list[tuple[float, float]], ti
     radial, turn = (each.ravel() for each in np.meshgrid(away, turns, indexing="ij"))
     middle = core * np.sign(np.sin(turn))
     across, along = middle + radial * np.sin(turn), radial * np.cos(turn) - rounded
-    end = [each.ravel() for each in np.meshgrid(np.linspace(-core, core, 41), away)]
+    end = [each.ravel() for each in np.meshgrid(places_between(-core, core, 41), away)]
     sides = [each.ravel() for each in np.meshgrid(np.linspace(-4e-3, -rounded, 201), away)]
-    inner = [each.ravel() for each in np.meshgrid(np.linspace(-core, core, 201), np.linspace(-4e-3, -rounded, 201))]
+    inner = [each.ravel() for each in np.meshgrid(places_between(-core, core, 201), np.linspace(-4e-3, -rounded, 201))]
     places = np.concatenate(
         [
             np.column_stack([*inner, 0.0 * inner[0]]),
@@ -61,9 +65,15 @@ def dilated(u: FloatArray, s: FloatArray, corners: list[tuple[float, float]], ti
         ]
     )
     heights = np.interp(core + places[:, 2], x, z)
-    gap = (u[:, None] - places[:, 0]) ** 2 + (s[:, None] - places[:, 1]) ** 2
-    arcs = heights - gap / (tip + np.sqrt(np.clip(tip**2 - gap, 0.0, None)))
-    return np.asarray(np.maximum(np.where(gap < tip**2, arcs, -1.0).max(axis=1), 0.0))
+    across, along = np.ascontiguousarray(places[:, 0]), np.ascontiguousarray(places[:, 1])
+    return np.array([held(heights, (x - across) ** 2 + (y - along) ** 2, tip) for x, y in zip(u, s, strict=True)])
+
+
+def held(heights: FloatArray, gap: FloatArray, tip: float) -> float:
+    """How high points of given heights, at squared distances, hold the ball up over the plane."""
+    near = gap < tip**2
+    gap = gap[near]
+    return max(0.0, float((heights[near] - gap / (tip + np.sqrt(tip**2 - gap))).max(initial=0.0)))
 
 
 @pytest.mark.parametrize(
@@ -81,10 +91,12 @@ def dilated(u: FloatArray, s: FloatArray, corners: list[tuple[float, float]], ti
 def test_the_ball_rests_on_what_holds_it_highest(
     corners: list[tuple[float, float]], tip: float, beyond: float, rounding: float
 ) -> None:
-    u, rounded = np.linspace(-4e-3, 4e-3, 81), rounding * corners[0][0]
+    half, rounded = np.linspace(0.0, 4e-3, 41), rounding * corners[0][0]
+    u = np.concatenate([-half[:0:-1], half])
     felt = trace(u, np.full(81, beyond), corners, tip, rounded=rounded)
+    on_one_side = dilated(half, np.full(41, beyond), corners, tip, rounded)  # the body is its own mirror image
     # the points miss the highest one by up to 10 um along an outline, 8 um round a corner, and 7 um down a flank
-    np.testing.assert_allclose(felt, dilated(u, np.full(81, beyond), corners, tip, rounded), atol=3e-6)
+    np.testing.assert_allclose(felt, np.concatenate([on_one_side[:0:-1], on_one_side]), atol=3e-6)
 
 
 def test_beyond_its_end_a_wide_bar_is_a_step() -> None:

@@ -28,17 +28,19 @@ def rolled(at: FloatArray, tip: float, *shape: float) -> FloatArray:
     return np.array([(z[m] + np.sqrt(tip**2 - (u[m] - x) ** 2) - tip).max() for m, x in zip(near, at, strict=True)])
 
 
-def on_a_circle(at: float, curvature: float, height: float, half: float, taper: float) -> float:
-    """Height at which a ball rests over a place of a circle, along it, by trying every place of the section."""
+def on_a_circle(at: FloatArray, curvature: float, height: float, half: float, taper: float) -> list[float]:
+    """Heights at which a ball rests over places of a circle, along it, by trying every place of the section."""
     radius = 1.0 / curvature if curvature != 0.0 else 1e3
     u = np.linspace(-10e-3, 10e-3, 400_001)
-    up = np.column_stack([np.sin(u / radius), np.cos(u / radius)])
-    points = (radius - section(u, height, half, taper))[:, None] * up
-    way = np.array([np.sin(at / radius), np.cos(at / radius)])
-    foot = radius * way
-    beside = (points - foot) @ np.array([way[1], -way[0]])
-    near = np.abs(beside) < TIP
-    return float(((points[near] - foot) @ way + np.sqrt(TIP**2 - beside[near] ** 2) - TIP).max())
+    out = radius - section(u, height, half, taper)
+    found = []
+    for place in at:
+        turn = (u - place) / radius
+        beside = out * np.sin(turn)
+        near = np.abs(beside) < TIP
+        up = out[near] * np.cos(turn[near]) - radius
+        found.append(float((up + np.sqrt(TIP**2 - beside[near] ** 2) - TIP).max()))
+    return found
 
 
 @pytest.mark.parametrize("curvature", [-120.0, -40.0, 60.0, 200.0])
@@ -48,7 +50,7 @@ def on_a_circle(at: float, curvature: float, height: float, half: float, taper: 
 def test_a_round_base_is_a_circle_and_no_other_ball(curvature: float, height: float, half: float, taper: float) -> None:
     spacing, table = 0.05e-3, np.empty(80)
     smooth_trace(height, half, taper, TIP, curvature, table, spacing)
-    expected = [on_a_circle(k * spacing, curvature, height, half, taper) for k in range(0, 80, 4)]
+    expected = on_a_circle(spacing * np.arange(0, 80, 4), curvature, height, half, taper)
     felt = np.maximum(table[::4], 0.0) if height > 0.0 else table[::4]
     np.testing.assert_allclose(felt, np.maximum(expected, 0.0) if height > 0.0 else expected, atol=3e-5 * abs(height))
 

@@ -70,7 +70,7 @@ def lead_along(axis: np.ndarray, beside: float, turned: float) -> tuple[FaintLea
     return FaintLead(seed, way / np.linalg.norm(way), 100, 0.05), across
 
 
-@pytest.mark.parametrize("number", [21, 22, 23])
+@pytest.mark.parametrize("number", [21, *(pytest.param(number, marks=pytest.mark.slow) for number in (22, 23))])
 def test_a_groove_a_quarter_of_the_noise_deep_is_followed_to_its_ends_by_many_passes(number: int) -> None:
     scene = groove(np.random.default_rng(number))
     finger = SimulatedFinger(object=scene.object, tip_radius=TIP_RADIUS, seed=number, **APPARATUS)

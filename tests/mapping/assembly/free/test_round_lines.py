@@ -24,7 +24,7 @@ def helix(place: float, height: float) -> Trace:
     return Trace(2e-4 * np.arange(float(len(angle))), centers, np.zeros(len(angle)), TIP)
 
 
-@pytest.mark.parametrize("turns", [2.5, 3.2])
+@pytest.mark.parametrize("turns", [pytest.param(2.5, marks=pytest.mark.slow), 3.2])
 def test_a_ring_that_one_turn_of_a_helix_ran_along_is_a_ridge_at_least_as_high_as_it_was_felt(turns: float) -> None:
     trace = helix(turns * PITCH, 0.1e-3)
     base = fit_base(trace)

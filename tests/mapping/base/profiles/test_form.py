@@ -97,7 +97,7 @@ def test_a_wavelength_longer_than_the_profile_is_refused() -> None:
 WORLDS = ((1e-6, 0.5e-3, 1e-7, 4800), (2e-6, 0.2e-3, 2e-7, 4800), (5e-6, 0.25e-3, 1e-7, 2000), (0.0, 1.0, 5e-7, 600))
 
 
-@pytest.mark.parametrize("seed", range(300, 305))
+@pytest.mark.parametrize("seed", [300, 301, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (302, 303, 304))])
 @pytest.mark.parametrize("world", WORLDS)
 def test_a_scratch_is_found_or_said(world: tuple[float, float, float, int], seed: int) -> None:
     wavy, wavelength, noise, samples = world

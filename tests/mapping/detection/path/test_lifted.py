@@ -52,7 +52,7 @@ def laid(trace: Trace) -> LaidTrace:
 
 
 @pytest.mark.parametrize(
-    ("lift", "step"), [(3e-3, 0.2e-3), (20e-3, 0.03e-3), pytest.param(20e-3, 0.2e-3, marks=pytest.mark.slow)]
+    ("lift", "step"), [(3e-3, 0.2e-3), (20e-3, 0.2e-3), pytest.param(20e-3, 0.03e-3, marks=pytest.mark.slow)]
 )
 def test_paths_through_the_air_are_told_from_rows(lift: float, step: float) -> None:
     trace, felt = recorded([row(y, k % 2 == 0) for k, y in enumerate(ROWS)], lift, step)

@@ -127,7 +127,7 @@ def test_a_bar_that_opens_at_an_edge_is_felt_as_it_is(degrees: float) -> None:
     assert np.abs(bar.templates(theta)[0] - true).max() < 1e-6
 
 
-@pytest.mark.parametrize("degrees", [90.0, 60.0])
+@pytest.mark.parametrize("degrees", [pytest.param(90.0, marks=pytest.mark.slow), 60.0])
 @pytest.mark.parametrize("family", [SmoothGrooveShape, BellRidgeShape, RidgeShape])
 def test_round_and_smooth_sections_are_cut_off_as_they_are(family: Any, degrees: float) -> None:
     window, way = around_the_edge(3e-3), outwards(degrees)

@@ -87,7 +87,7 @@ def test_two_near_steps_are_changes_of_one_level_and_the_next(apart, second):
         assert np.sign(one.height.median) == np.sign(height)
 
 
-@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("side", [-1.0, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_a_wire_stands_on_the_level_of_a_step_beside_it(side):
     wall = feature("step", np.array([[0.0, -9e-3, 0.0], [0.0, 9e-3, 0.0]]), 0.3e-3, 0.0, 10)
     wall = replace(wall, details=replace(wall.details, high_side=-1.0))  # x > 0

@@ -24,11 +24,12 @@ ROOT = Path(__file__).resolve().parents[4]
 HOME = ROOT / "mapping" / "inference" / "kinds"
 # Truths are stated there, not asked for
 TRUTHS = ROOT / "explore3d" / "bench" / "scenes"
+NAMES = {*KINDS, *(kind_named(name).plural for name in KINDS)}
 
 
 def constants(node: ast.AST) -> set[str]:
     found = {each.value for each in ast.walk(node) if isinstance(each, ast.Constant) and isinstance(each.value, str)}
-    return found & {*KINDS, *(kind_named(name).plural for name in KINDS)}
+    return found & NAMES
 
 
 def namings(source: str) -> Iterator[tuple[int, str]]:
