@@ -295,6 +295,12 @@ def fitted(work: Work, share: Share) -> None:
     for bend in _bends(work.base, "absorbed"):
         end = "was taken for the base's own form; if it is a feature, say --form line, arc or poly:2, or --mask it"
         work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {end}"))
+    for slope in _bends(work.base, "slopes"):
+        height, width = length_text(abs(slope["height"]), 2), length_text(slope["width"], 2)
+        way = "rises" if slope["height"] > 0.0 else "falls"
+        end = "wider than fine features are: it is taken for the base's own form, and no step is told"
+        text = f"from one level to another the profile {way} by {height} over {width} at {_place_of(slope)}, {end}"
+        work.stages.left_out.append(LeftOut(ABSORBED, text))
 
 
 def _bends(base: Base, name: str) -> list[dict[str, Any]]:
@@ -306,9 +312,12 @@ def _bends(base: Base, name: str) -> list[dict[str, Any]]:
 def _described(bend: dict[str, Any]) -> str:
     """What stands alone in a profile: depth, width, place."""
     kind, sense = ("hollow", "deep") if bend["height"] < 0 else ("hump", "high")
-    place = ", ".join(f"{1e3 * value:.4g}" for value in bend["place"])
     height, width = length_text(abs(bend["height"]), 2), length_text(bend["width"], 2)
-    return f"a {kind} {height} {sense} and {width} wide at ({place}) mm"
+    return f"a {kind} {height} {sense} and {width} wide at {_place_of(bend)}"
+
+
+def _place_of(bend: dict[str, Any]) -> str:
+    return f"({', '.join(f'{1e3 * value:.4g}' for value in bend['place'])}) mm"
 
 
 def _open_end_text(end: dict[str, Any]) -> str:
