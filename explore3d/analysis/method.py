@@ -295,6 +295,9 @@ def fitted(work: Work, share: Share) -> None:
     for bend in _bends(work.base, "absorbed"):
         end = "was taken for the base's own form; if it is a feature, say --form line, arc or poly:2, or --mask it"
         work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {end}"))
+    for slope in _bends(work.base, "slopes"):
+        end = "wider than fine features are: it is taken for the base's own form, and no step is told"
+        work.stages.left_out.append(LeftOut(ABSORBED, f"{_climb_text(slope)}, {end}"))
 
 
 def _bends(base: Base, name: str) -> list[dict[str, Any]]:
@@ -306,9 +309,18 @@ def _bends(base: Base, name: str) -> list[dict[str, Any]]:
 def _described(bend: dict[str, Any]) -> str:
     """What stands alone in a profile: depth, width, place."""
     kind, sense = ("hollow", "deep") if bend["height"] < 0 else ("hump", "high")
-    place = ", ".join(f"{1e3 * value:.4g}" for value in bend["place"])
     height, width = length_text(abs(bend["height"]), 2), length_text(bend["width"], 2)
-    return f"a {kind} {height} {sense} and {width} wide at ({place}) mm"
+    return f"a {kind} {height} {sense} and {width} wide at {_place_of(bend)}"
+
+
+def _climb_text(climb: dict[str, Any]) -> str:
+    way, height = "rises" if climb["height"] > 0.0 else "falls", length_text(abs(climb["height"]), 2)
+    over = f"{length_text(climb['width'], 2)} at {_place_of(climb)}"
+    return f"from one level to another the profile {way} by {height} over {over}"
+
+
+def _place_of(bend: dict[str, Any]) -> str:
+    return f"({', '.join(f'{1e3 * value:.4g}' for value in bend['place'])}) mm"
 
 
 def _open_end_text(end: dict[str, Any]) -> str:
@@ -787,6 +799,12 @@ def standing_told(work: Work, share: Share) -> None:
         told = any(_stands_between(each, level, work.trace.tip_radius) for each in work.features)
         if not told and not any(_climbs_at(each, level, work.trace.tip_radius) for each in beside):
             work.stages.left_out.append(LeftOut(ABSORBED, _unclimbed_text(level)))
+    steps = [feature.axis for feature in work.features if kind_of(feature).sided]
+    for climb in _bends(work.base, "climbs"):
+        reach = 0.5 * climb["width"] + work.trace.tip_radius  # centres stand a radius above the body
+        if not any(distances(np.array([climb["place"]]), axis)[0] < reach for axis in steps):
+            end = "and no step accounts for it: its levels may be no levels, and what is told there is a guess"
+            work.stages.left_out.append(LeftOut(ABSORBED, f"{_climb_text(climb)}, {end}"))
     for bend in found[:MOST_STANDING]:
         seen = f" in {count_text(bend['sweeps'], 'sweep')}" if "sweeps" in bend else ""
         work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)}{seen} {_TOO_WIDE}"))

@@ -25,7 +25,7 @@ from mapping.geometry.mesh import distances
 from mapping.geometry.templates import SHAPE_ERROR
 from mapping.inference.configuration import PROPOSALS, Places, Proposal, accounted, is_two
 from mapping.inference.families import Surroundings
-from mapping.inference.kinds import kind_made_of
+from mapping.inference.kinds import kind_made_of, kind_of
 
 # A crossing lower than this share of its group's is an outlier if it lies so many half-widths off the others, and so
 # many from any other low one; where others are so many that they are a line, not a spot with low rims.
@@ -255,8 +255,19 @@ def _of_profile(detections: Detections, laid: LaidTrace) -> tuple[Feature, ...]:
     fine, standing = (
         [point_feature([c], _name(c), detections, laid.tip_radius) for c in crossings] for crossings in (rest, upon)
     )
+    fine = [_as_wide_as_base_says(each, laid.base) for each in fine]
     measured = [replace(each, details=replace(each.details, free_section=True)) for each in standing]
     return _strongest_first([*wide, *fine, *measured])
+
+
+def _as_wide_as_base_says(feature: Feature, base: Base) -> Feature:
+    """A step with the run of the base's climb that it is on, if that is slanted, in its middle."""
+    for place, run in base.climbs if kind_of(feature).sided else ():
+        apart = place - feature.axis[0]
+        aside = apart - (apart @ feature.normals[0]) * feature.normals[0]
+        if np.linalg.norm(aside) < run:
+            return replace(feature, axis=feature.axis + aside, details=replace(feature.details, run=run))
+    return feature
 
 
 def _name(crossing: Crossing) -> str:

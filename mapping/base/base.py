@@ -135,6 +135,13 @@ class Base:
         above = told[1:] if isinstance(told, list) else []
         return np.array([0.0, *(value for value in above if isinstance(value, float))])
 
+    @property
+    def climbs(self) -> list[tuple[FloatArray, float]]:
+        """Middle (3,) on the line of centres, and run, m, of each slanted edge between two levels of a profile."""
+        told = self.parameters.get("climbs")
+        rows = [each for each in told if isinstance(each, dict)] if isinstance(told, list) else []
+        return [(np.array(each["place"], dtype=np.float64), float(each["width"])) for each in rows]
+
     def record(self) -> dict[str, Any]:
         """JSON values of all but the surface and the kind: the "parameters" of model.json and of a log's base."""
         missed = {} if self.missed is None else {"missed": self.missed}

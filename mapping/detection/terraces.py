@@ -36,14 +36,39 @@ TERRACE_BINS = 4
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """The two terraces about an edge: heights over the lower one, and the bins (first, past-last) that stand off it."""
+    """The two terraces about an edge: heights over the lower one, and the bins (first, past-last) that stand off it.
+
+    Of a slanted edge the base tells where the climb begins and ends: `climb` are its bins (first, past-last).
+    """
 
     piece: SweepHeights
     high: tuple[int, int]
+    climb: tuple[int, int] | None = None
 
     def step(self, noise: Noise, tip_radius: float) -> Disturbance:
         """The higher terrace as a plateau, which goes on beyond the piece on its other side."""
-        return fit_cap(self.piece.height, self.high, 1.0, self.piece, noise, 0, tip_radius)
+        if self.climb is None:
+            return fit_cap(self.piece.height, self.high, 1.0, self.piece, noise, 0, tip_radius)
+        piece, (begin, end), count = self.piece, self.climb, len(self.piece.height)
+        means = [float(piece.height[own].mean()) for own in (slice(0, begin), slice(end, count))]
+        bins = np.array([begin, count - end])
+        sds = [float(noise.block_covariances(1, n * piece.spacing, n * piece.samples)[0]) ** 0.5 for n in bins]
+        height, sd, run = abs(means[1] - means[0]), float(np.hypot(*sds)), (end - begin) * piece.spacing
+        # the plateau reaches as far beyond the piece as it does within
+        up = means[1] > means[0]
+        flat = piece.spacing * float(bins[1 if up else 0])
+        return Disturbance(
+            place=piece.start + piece.spacing * (count if up else 0),
+            start=piece.start + piece.spacing * (begin if up else 0),
+            stop=piece.start + piece.spacing * (count if up else end),
+            height=height,
+            height_sd=sd,
+            place_sd=max(sd * run / height, piece.spacing) if height > 0.0 else run,
+            half_width=flat + run,
+            flat=flat,
+            curvature=0.0,
+            snr=height / max(sd, np.finfo(float).tiny),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,18 +112,20 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
     # what is as near to a level on an arc of the ball, whose top it may be, and as far again as means reach
     passed = int((2.0 * np.sqrt(tip_radius * on) + 2.0 * MEAN * tip_radius) / profile.spacing)
     runs = _runs(own.argmin(axis=1), own.min(axis=1) < on, reach, max(passed, TERRACE_BINS))
-    runs = _up_to_edges(runs, reach, smooth, levels)
+    climbs = [_climb(profile, *climb) for climb in base.climbs]
+    way_up = reach + max((end - begin for begin, end in climbs), default=0)
+    runs = _up_to_edges(runs, way_up, smooth, levels)
     bounds = [np.sort(levels[[here, there]]) for (_, _, here), (_, _, there) in itertools.pairwise(runs)]
     upon = [
         _beyond(smooth, begin, last, between, on)
         for ((begin, _, _), (_, last, _)), between in zip(itertools.pairwise(runs), bounds, strict=True)
     ]
-    # a long way from one level to the next is no edge, and the base's levels are none of this sweep's
+    # a longer way from one level to the next than the base has is no edge, and its levels are none of this sweep's
     bare = [
         onward - end - np.count_nonzero(stands[end:onward])
         for ((_, end, _), (onward, _, _)), stands in zip(itertools.pairwise(runs), upon, strict=True)
     ]
-    if not runs or max(bare, default=0) > reach:
+    if not runs or max(bare, default=0) > way_up:
         return Terraced(profile)
     # an arc is higher than the noise only so far from its end, and the means come a little nearer
     rounded = int((MEAN * tip_radius + np.sqrt(2 * tip_radius * on)) / profile.spacing) + 1
@@ -131,8 +158,18 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
         start, stop = max(begin, end - EDGE_TERRACES * reach), min(last, onward + EDGE_TERRACES * reach)
         piece = _piece(replace(profile, height=plain - min(levels[here], levels[there])), start, stop)
         up = levels[there] > levels[here]
-        edges.append(Edge(piece, (end - start, stop - start) if up else (0, onward - start)))
+        climb = next(
+            ((a - start, b - start) for a, b in climbs if start < a < b < stop and a < onward and end < b), None
+        )
+        edges.append(Edge(piece, (end - start, stop - start) if up else (0, onward - start), climb))
     return Terraced(replace(profile, height=height), tuple(edges), level)
+
+
+def _climb(profile: SweepHeights, place: FloatArray, run: float) -> tuple[int, int]:
+    """Bins (first, past-last) of a profile between which the base says that a slanted edge climbs."""
+    middle = int(np.linalg.norm(profile.centers - place, axis=1).argmin())
+    half = 0.5 * run / profile.spacing
+    return int(np.floor(middle - half)), int(np.ceil(middle + half)) + 1
 
 
 def _beyond(height: FloatArray, begin: int, end: int, bounds: FloatArray, noise: float) -> BoolArray:

@@ -23,6 +23,7 @@ from mapping.inference.families import (
     PosteriorProblem,
     RoundedFrustumShape,
     ShoulderedShape,
+    StepShape,
     Surroundings,
     WornTipShape,
     with_free_tip,
@@ -152,12 +153,15 @@ def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, P
         columns = kind.draws_of_height(shape, some), *(factor * each for each in (*widths, *own))
         parts.append(np.column_stack(columns))
     height, touched, bridged, least, most = np.concatenate(parts).T
-    interval = Interval.from_draws(height)
+    # the sign of a step is the side that it was come from
+    interval = Interval.from_draws(-height if kind.sided and feature.height.median < 0.0 else height)
+    upright = isinstance(shapes[0], StepShape) and not shapes[0].slanted  # it has none, however it may climb
     names = ", ".join(f"{name_of(problem)} {100 * share / total:.0f} %" for share, problem, _ in likely)
     known = f"sections that leave this trace: {names}"
     if np.mean(bridged > touched) < MOSTLY_BRIDGED:
         low, high = np.quantile(least, 0.05), np.quantile(most, 0.95)
         width = Interval(float(np.median(least[least == most])), float(low), float(high))
+        width = feature.width if upright else width
         if worn:  # its flat makes the plateau: a sharper crest leaves this trace, too, which no round section tells
             width = replace(width, low=0.0, censored=True, bounded=True)
         notes = (f"{known}; width at half height" if bells[0] else known,) if len(likely) > 1 else ()
@@ -196,6 +200,8 @@ def _section_name(shape: Shape) -> str:
         return "bell"
     if isinstance(shape, ShoulderedShape | RoundedFrustumShape):
         return "flat-topped with round edges"
+    if isinstance(shape, StepShape):
+        return "slanted" if shape.slanted else "upright"
     if not isinstance(shape, FlatTopped):
         return "round"
     if not shape.roof:

@@ -27,6 +27,7 @@ from mapping.inference.families import (
     with_worn_tip,
 )
 from mapping.inference.kinds import kind_of
+from mapping.inference.likelihood import Shape
 from mapping.inference.model_error import account_for_misfit
 from mapping.inference.pooled_residual import PooledResidual, pooled_residual, with_remark
 from mapping.inference.sampler import (
@@ -227,12 +228,14 @@ def _likeliest(problems: Sequence[PosteriorProblem], rng: np.random.Generator, c
         solved.append(Solution(rival, _from_importance(rival, fast, rng), fast, None))
         weights.append(_log_weight(solved[-1]))
     shares = probabilities(weights)
-    order = [int(k) for k in np.argsort(-shares, kind="stable")]
+    unlikely = shares <= UNLIKELY_FAMILY * shares.max()
+    more = np.array([kind_of(each.problem.feature).claims_more(_nominal(each)) for each in solved])
+    order = [int(k) for k in np.lexsort((-shares, more, unlikely))]
     first = solved[order[0]]
     if first is not best and confirm is not None and (confirm or first.importance.k_hat >= TRUSTED_K_HAT):
         first = solve_problem(first.problem, rng, confirm=confirm, adapt=False)
-    likely = [(float(shares[k] / shares[order[0]]), solved[k]) for k in order[1:]]
-    return replace(first, likely=tuple(each for each in likely if each[0] > UNLIKELY_FAMILY))
+    likely = [(float(shares[k] / shares[order[0]]), solved[k]) for k in order[1:] if not unlikely[k]]
+    return replace(first, likely=tuple(likely))
 
 
 def _log_weight(solution: Solution) -> float:
@@ -242,8 +245,13 @@ def _log_weight(solution: Solution) -> float:
 
 def _plain_odds(solution: Solution) -> float:
     """Bayes factor of the plainest member of a solved family against all of it."""
-    shape = with_nominal_tip(solution.problem).target.shape
+    shape = _nominal(solution)
     return kind_of(solution.problem.feature).plain_odds(shape, solution.posterior.samples[:, : len(shape.names)])
+
+
+def _nominal(solution: Solution) -> Shape:
+    """The family as the nominal tip feels it."""
+    return with_nominal_tip(solution.problem).target.shape
 
 
 def _pooled(solution: Solution, noise: Noise) -> PooledResidual:

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from mapping import FloatArray, Surface, Trace
+from mapping.base.profiles.climbs import possible_climbs
+from mapping.base.profiles.edges import BESIDE_KINK, EDGE_FREEDOM, Edge, Slopes, are_apart, climbed, returning
 from mapping.base.profiles.evidence import Scatter
 from mapping.base.profiles.form import AUTO, Form, form_line
 from mapping.base.profiles.frame import ProfileFrame
 from mapping.base.profiles.isolated_bends import Bend, isolated_bends, isolated_rest
-from mapping.base.profiles.jumps import MOST_JUMPS, are_apart, possible_jumps, steps_up, told_apart
+from mapping.base.profiles.jumps import MOST_JUMPS, possible_jumps, told_apart
 from mapping.geometry.mesh import Spline, spline_design
 from mapping.instrument import RobustFit, fit_on_densest, neighbour_scatter, robust_fit, robust_scale, span_of
 
@@ -23,8 +25,6 @@ PIECES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 PROFILE_CELLS = 480
 # Of the greatest height: an exact profile has no smaller scatter than its digits
 LEAST_DIGITS = 1e-12
-# A place is a parameter that only one cell in n fits: it costs twice what a height does (2 log n against log n)
-EDGE_FREEDOM = 2
 # A piece of a cubic has four coefficients: with fewer places between masked stretches than that nothing determines it
 CELLS_PER_PIECE = 4
 
@@ -55,6 +55,8 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
     along = offset @ frame.along
     start, stop = float(along.min()), float(along.max())
     keep = form.unmasked(trace)
+    order = np.flatnonzero(keep)[np.argsort(along[keep], kind="stable")]
+    samples = along[order], offset[order] @ frame.outward
     x, z = _cell_medians(along[keep], offset[keep] @ frame.outward)
     scale = neighbour_scatter(z)
     if form.kind != "auto":
@@ -70,16 +72,20 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
         if form.masks and np.histogram(x, knots[degree : len(knots) - degree])[0].min() < CELLS_PER_PIECE:
             continue
         splines.append(_Spline(spline_design(x, knots, degree), knots, degree, pieces))
-    best, chosen, edges, scatter = _likeliest(splines, x, z, scale, trace.tip_radius)
+    best, chosen, edges, scatter = _likeliest(splines, x, z, samples, scale, trace.tip_radius)
     knots, degree, pieces = chosen.knots, chosen.degree, chosen.pieces
-    heights = np.append(0.0, np.cumsum(best.coefficients[chosen.design.shape[1] :]))
-    level = steps_up(edges, len(x)).sum(axis=1).astype(np.int64)
+    rise = best.coefficients[chosen.design.shape[1] :]
+    wide = np.array([edge.run > SHORTEST_BEND * trace.tip_radius for edge in edges], dtype=bool)
+    slopes = Slopes([edges[k] for k in np.flatnonzero(wide)], rise[wide], trace.tip_radius)
+    edges, rise = [edges[k] for k in np.flatnonzero(~wide)], rise[~wide]
+    heights = np.append(0.0, np.cumsum(rise))
+    level = np.searchsorted([edge.index for edge in edges], np.arange(len(x)))
     ground = heights[np.bincount(level).argmax()]  # the base is the level with the most places
-    heights, z = heights - ground, z - (heights - ground)[level]
+    heights, z = heights - ground, z - (climbed(edges, x, trace.tip_radius) @ rise - ground)
     # the pieces of a spline sum to one: a constant is one of every coefficient
-    curve = Spline(knots, best.coefficients[: chosen.design.shape[1]] + ground, degree)
-    places = np.linspace(start, stop, 64 * pieces + 1)
-    ribbon = _ribbon(trace.tip_radius, frame, places, curve(places), curve.derivative()(places))
+    curve = _Line(Spline(knots, best.coefficients[: chosen.design.shape[1]] + ground, degree), slopes)
+    places = slopes.sampled(np.linspace(start, stop, 64 * pieces + 1))
+    ribbon = _ribbon(trace.tip_radius, frame, places, curve(places), curve.slope(places))
     fitted: dict[str, Any] = {"degree": float(degree), "pieces": float(pieces), "piece_length": (stop - start) / pieces}
     fitted["on_base"] = scatter.share_on(best.residual)
     felt = scatter.felt_part(best.residual, EDGE_FREEDOM * scatter.price(len(x)))
@@ -87,9 +93,33 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
     rest = isolated_rest(x, z, curve(x), scale, SHORTEST_BEND * trace.tip_radius)
     if edges:
         fitted["levels"] = told_apart(heights, scatter.within(best.residual)).tolist()
+    for name, some, up in (("climbs", edges, rise), ("slopes", slopes.edges, slopes.rises)):
+        told = zip(some, up.tolist(), strict=True)
+        fitted |= _listed(name, [Bend(h, each.run, each.place) for each, h in told if each.run > 0.0], frame, curve)
     if ends := _open_ends(x, z - curve(x), felt, frame, curve):
         fitted["open_ends"] = ends
     return ribbon, fitted | _listed("absorbed", bends, frame, curve) | _listed("left standing", rest, frame, curve)
+
+
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """What a base follows: a smooth curve, and the climbs upon it that are too wide for features."""
+
+    smooth: Spline
+    slopes: Slopes
+
+    def __call__(self, x: FloatArray | float) -> FloatArray:
+        """(N,) heights, m."""
+        smooth = np.asarray(self.smooth(x))
+        return np.asarray(smooth + self.slopes(x)) if self.slopes.edges else smooth
+
+    def slope(self, x: FloatArray) -> FloatArray:
+        """(N,) slopes."""
+        beside = 0.5 * BESIDE_KINK * self.slopes.tip_radius
+        own = np.asarray(self.smooth.derivative()(x))
+        if not self.slopes.edges:
+            return own
+        return np.asarray(own + (self.slopes(x + beside) - self.slopes(x - beside)) / (2.0 * beside))
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,21 +133,48 @@ class _Spline:
 
 
 def _likeliest(
-    splines: list[_Spline], x: FloatArray, z: FloatArray, scale: float, tip_radius: float
-) -> tuple[RobustFit, _Spline, list[int], Scatter]:
+    splines: list[_Spline],
+    x: FloatArray,
+    z: FloatArray,
+    samples: tuple[FloatArray, FloatArray],
+    scale: float,
+    tip_radius: float,
+) -> tuple[RobustFit, _Spline, list[Edge], Scatter]:
     """The spline with the edges that are worth their price, these, and by which scatter it was judged.
 
-    Its further coefficients are the edges' heights.
+    Its further coefficients are the edges' heights. What slanted edges lead to and back from is no level but a detail.
     """
-    count = len(z)
-    candidates = [int(i) for i in possible_jumps(x, z, scale, tip_radius)]
+    upright = [Edge.upright(int(i)) for i in possible_jumps(x, z, scale, tip_radius)]
     least = max(scale, LEAST_DIGITS * float(np.abs(z).max()), np.finfo(float).tiny)
-    freest = robust_fit(np.hstack([splines[-1].design, steps_up(candidates, count)]), z, least).residual
-    span = span_of(robust_fit(splines[0].design, z, least).residual, least)
-    scatter = Scatter.left_by(freest, least, span)
+    slanted = possible_climbs(x, z, samples, _scatter(splines, x, z, upright, least, tip_radius)[0], least, tip_radius)
+    while slanted:
+        found = fit, spline, edges, scatter = _chosen(splines, x, z, [*slanted, *upright], least, tip_radius)
+        heights = fit.coefficients[spline.design.shape[1] :]
+        back = returning(edges, heights, scatter.within(fit.residual), len(x))
+        if not back and any(edge.run > 0.0 for edge in edges):
+            return found
+        slanted = [edge for edge in slanted if edge in back] and [edge for edge in slanted if edge not in back]
+    return _chosen(splines, x, z, upright, least, tip_radius)
 
-    def best(edges: list[int]) -> tuple[float, RobustFit, _Spline]:
-        up = steps_up(edges, count)
+
+def _scatter(
+    splines: list[_Spline], x: FloatArray, z: FloatArray, candidates: list[Edge], least: float, tip_radius: float
+) -> tuple[Scatter, FloatArray]:
+    """By which scatter curves are judged: as the freest leaves it, and (N,) what that leaves, m."""
+    freest = robust_fit(np.hstack([splines[-1].design, climbed(candidates, x, tip_radius)]), z, least).residual
+    span = span_of(robust_fit(splines[0].design, z, least).residual, least)
+    return Scatter.left_by(freest, least, span), freest
+
+
+def _chosen(
+    splines: list[_Spline], x: FloatArray, z: FloatArray, candidates: list[Edge], least: float, tip_radius: float
+) -> tuple[RobustFit, _Spline, list[Edge], Scatter]:
+    """The likeliest spline with some of the candidates for edges."""
+    count = len(z)
+    scatter, freest = _scatter(splines, x, z, candidates, least, tip_radius)
+
+    def best(edges: list[Edge]) -> tuple[float, RobustFit, _Spline]:
+        up = climbed(edges, x, tip_radius)
         # a curve may be held by the half of a profile that is fine, or by all of it where all is rough
         scales = {least, max(least, robust_scale(freest))}
         fits = list[tuple[RobustFit, _Spline]]()
@@ -130,16 +187,17 @@ def _likeliest(
         price = scatter.price(count)
 
         def cost(fit: RobustFit) -> float:
-            return scatter.misfit(fit.residual) + price * (len(fit.coefficients) + EDGE_FREEDOM * len(edges))
+            return scatter.misfit(fit.residual) + price * (len(fit.coefficients) + sum(edge.freedom for edge in edges))
 
         return min(((cost(fit), fit, each) for fit, each in fits), key=lambda found: found[0])
 
-    edges = list[int]()
+    edges = list[Edge]()
     cost, fit, spline = best(edges)
     while len(edges) < MOST_JUMPS:
-        further = [[*edges, i] for i in candidates if i not in edges and are_apart([*edges, i], count)]
+        further = [[*edges, one] for one in candidates if one not in edges and are_apart([*edges, one], count)]
+        further = [sorted(some, key=lambda edge: edge.index) for some in further]
         tried = [(*best(some), some) for some in further]
-        tried = [each for each in tried if scatter.ends_on(each[1].residual, each[-1])]
+        tried = [each for each in tried if scatter.ends_on(each[1].residual, _at(each[-1]))]
         if not tried or min(each[0] for each in tried) >= cost:
             break
         cost, fit, spline, edges = min(tried, key=lambda each: each[0])
@@ -147,23 +205,27 @@ def _likeliest(
     fewer = _apart(candidates, count)
     while len(fewer) > 1:
         whole = best(fewer)
-        if whole[0] < cost and scatter.ends_on(whole[1].residual, fewer):
+        if whole[0] < cost and scatter.ends_on(whole[1].residual, _at(fewer)):
             (cost, fit, spline), edges = whole, fewer
-        fewer = min(([i for i in fewer if i != one] for one in fewer), key=lambda some: best(some)[0])
-    return fit, spline, sorted(edges), scatter
+        fewer = min(([other for other in fewer if other != one] for one in fewer), key=lambda some: best(some)[0])
+    return fit, spline, edges, scatter
 
 
-def _apart(candidates: list[int], count: int) -> list[int]:
-    """The highest edges that leave levels which are long enough."""
-    edges = list[int]()
-    for i in candidates:
-        if len(edges) < MOST_JUMPS and are_apart([*edges, i], count):
-            edges.append(i)
-    return edges
+def _apart(candidates: list[Edge], count: int) -> list[Edge]:
+    """The highest edges that leave levels which are long enough, along the profile."""
+    edges = list[Edge]()
+    for one in candidates:
+        if len(edges) < MOST_JUMPS and are_apart([*edges, one], count):
+            edges.append(one)
+    return sorted(edges, key=lambda edge: edge.index)
+
+
+def _at(edges: list[Edge]) -> list[int]:
+    return [edge.index for edge in edges]
 
 
 def _open_ends(
-    x: FloatArray, off: FloatArray, felt: tuple[int, int], frame: ProfileFrame, curve: Spline
+    x: FloatArray, off: FloatArray, felt: tuple[int, int], frame: ProfileFrame, curve: _Line
 ) -> list[dict[str, Any]]:
     """Of each end that leaves the curve for good: from where and to where, [x, y, z], and how high at most, m."""
     first, last = felt
@@ -175,7 +237,7 @@ def _open_ends(
     return [{"from": place(a), "to": place(b), "height": float(part[np.abs(part).argmax()])} for a, b, part in ends]
 
 
-def _listed(name: str, bends: list[Bend], frame: ProfileFrame, curve: Spline) -> dict[str, Any]:
+def _listed(name: str, bends: list[Bend], frame: ProfileFrame, curve: _Line) -> dict[str, Any]:
     """Height, width and place [x, y, z] of each on the line of centres, m; nothing where there is none."""
     listed = [
         {"height": bend.height, "width": bend.width}

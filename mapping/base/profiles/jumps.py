@@ -44,21 +44,29 @@ def possible_jumps(x: FloatArray, z: FloatArray, scale: float, tip_radius: float
     found = list[tuple[float, int]]()
     for width in WIDTHS_OF_EDGE[: int(np.searchsorted(WIDTHS_OF_EDGE, side, side="right"))]:
         narrower = [i for _, i in found]
-        rises = _rises(x, z, scale, tip_radius, width, side)
-        found += [(rise, i) for rise, i in rises if not _near(i, narrower, width)]
+        told = rises(x, z, scale, tip_radius, width, side)
+        found += [(rise, i) for rise, i in told if not _near(i, narrower, width)]
     return np.array([i for _, i in sorted(found, key=lambda each: -each[0])[: 2 * MOST_JUMPS]], dtype=np.int64)
 
 
-def _rises(
-    x: FloatArray, z: FloatArray, scale: float, tip_radius: float, width: int, side: int
+def rises(
+    x: FloatArray, z: FloatArray, scale: float, tip_radius: float | None, width: int, side: int
 ) -> list[tuple[float, int]]:
-    """How high a profile rises for good over so many places, and after which index the middle of that lies."""
+    """How high a profile rises for good over so many places, and after which index the middle of that lies.
+
+    Args:
+        x, z, scale: as for `possible_jumps`.
+        tip_radius: of the ball that rolls over upright edges, m; None: climbs may be as gentle as they are.
+        width: places.
+        side: places of a level on either side.
+    """
     rise, run = z[width:] - z[:-width], x[width:] - x[:-width]
     off = rise - np.median(rise)
     usual = max(robust_scale(off), np.sqrt(2.0) * scale, np.finfo(float).tiny)
     slope = np.median(np.diff(z) / np.maximum(np.diff(x), np.finfo(float).tiny))
-    arc = contact_half_width(np.minimum(np.abs(off), tip_radius), 0.0, tip_radius)
-    edge = (np.abs(off) > JUMP_SDS * usual) & ((run <= arc) if width > 1 else True)
+    edge = np.abs(off) > JUMP_SDS * usual
+    if width > 1 and tip_radius is not None:
+        edge &= run <= contact_half_width(np.minimum(np.abs(off), tip_radius), 0.0, tip_radius)
     found = list[tuple[float, int]]()
     for i in sorted(np.flatnonzero(edge), key=lambda i: -abs(off[i])):
         middle = int(i) + (width - 1) // 2
@@ -74,16 +82,6 @@ def _rises(
 def _near(index: int, others: list[int], width: int) -> bool:
     """True of what lies within so many places of another, wider than one."""
     return width > 1 and any(abs(index - other) < width for other in others)
-
-
-def are_apart(edges: list[int], count: int) -> bool:
-    """True if all levels between edges are long enough."""
-    return bool(np.diff(sorted(edges)).min(initial=count) >= SHORTEST_LEVEL * count)
-
-
-def steps_up(edges: list[int], count: int) -> FloatArray:
-    """(count, E) columns that are 1 beyond each edge."""
-    return (np.arange(count)[:, None] > np.array(edges, dtype=np.int64)[None, :]).astype(np.float64)
 
 
 def told_apart(heights: FloatArray, within: float) -> FloatArray:

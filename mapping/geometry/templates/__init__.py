@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         kink_angle as kink_angle,
         rim_height as rim_height,
         step_height as step_height,
+        untouched_run as untouched_run,
     )
     from mapping.geometry.templates.small_heights import (
         CREST_OUTLIER_SDS as CREST_OUTLIER_SDS,
@@ -63,6 +64,7 @@ _PUBLIC = {
         "kink_angle",
         "rim_height",
         "step_height",
+        "untouched_run",
     ),
     "small_heights": ("CREST_OUTLIER_SDS", "SHAPE_ERROR", "crest_trace", "robust_cost"),
     "smooth_kernels": ("half_ways_touched", "smooth_line_heights", "smooth_point_heights"),

@@ -104,6 +104,7 @@ def step_heights(
     bend: FloatArray,
     courses: FloatArray,
     heights: FloatArray,
+    runs: FloatArray,
     high_side: float,
     tip: float,
     out: FloatArray,
@@ -111,6 +112,7 @@ def step_heights(
     """Heights (W, n) of W steps over bins with nodes at lateral distances (n, q) from the chart.
 
     `basis` and `courses` are as for `about_course`; `bend` (n, q) is the curvature of the base across the edge, 1/m.
+    A step climbs evenly over its run (W,), m, about the course; 0: upright (see `step_height`).
     """
     walkers, bins = out.shape
     nodes = lateral.shape[1]
@@ -119,9 +121,17 @@ def step_heights(
             total = 0.0
             for q in range(nodes):
                 _, aside, _ = about_course(lateral, lateral, basis, courses[w], i, q)
-                inside = max(-high_side * aside, 0.0)
+                inside, felt = max(0.5 * runs[w] - high_side * aside, 0.0), 0.0
                 if inside < tip:  # farther off the ball does not touch the edge, however high it is
                     square = inside * inside
                     drop = square / (tip + np.sqrt((tip - inside) * (tip + inside))) + 0.5 * bend[i, q] * square
-                    total += max(heights[w] - drop, 0.0)
+                    felt = max(heights[w] - drop, 0.0)
+                if runs[w] > 0.0:
+                    ball = tip / max(1.0 + tip * bend[i, q], 1e-3)
+                    flank = np.sqrt(runs[w] * runs[w] + heights[w] * heights[w])
+                    at = high_side * aside + 0.5 * runs[w] + ball * heights[w] / flank
+                    if at >= 0.0 and at <= runs[w]:
+                        lift = ball * heights[w] * heights[w] / (flank * (flank + runs[w]))
+                        felt = max(felt, at * heights[w] / runs[w] - lift)
+                total += felt
             out[w, i] = total / nodes

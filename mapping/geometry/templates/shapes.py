@@ -54,15 +54,36 @@ def cap_height(x: ArrayLike, height: ArrayLike, radius: ArrayLike, tip_radius: f
     return np.asarray(np.maximum(np.asarray(height, dtype=np.float64) - drop, 0.0))
 
 
-def step_height(x: ArrayLike, height: ArrayLike, tip_radius: float) -> FloatArray:
-    """Trace of an upward step of height h >= 0 with its edge at x = 0, low side at x < 0, m.
+def step_height(x: ArrayLike, height: ArrayLike, tip_radius: float, run: ArrayLike = 0.0) -> FloatArray:
+    """Trace of an upward step of height h >= 0 with its middle at x = 0, low side at x < 0, m.
 
     0 up to the kink at -sqrt(2 r h - h^2), then an arc of radius r about the edge, then h. Up a wall of h > r the ball
     goes straight, at x = -r, until its middle is as high as the edge.
+    A slanted step climbs evenly over a run w from -w/2 to w/2. Where the ball rests on its flank, of length
+    f = sqrt(w^2 + h^2), at t from its foot, its middle lies r h / f before that and r (1 - w / f) less than r above it;
+    flanks steeper than the ball's own at the kink are never touched.
     """
     _require_tip(tip_radius)
-    inside = np.clip(-np.asarray(x, dtype=np.float64), 0.0, None)
-    return np.where(inside < tip_radius, cap_height(inside, height, 0.0, tip_radius), 0.0)
+    place, high = np.asarray(x, dtype=np.float64), np.asarray(height, dtype=np.float64)
+    inside = np.clip(0.5 * np.asarray(run, dtype=np.float64) - place, 0.0, None)
+    arc = np.where(inside < tip_radius, cap_height(inside, height, 0.0, tip_radius), 0.0)
+    if not np.any(run):
+        return arc
+    width = np.maximum(run, np.finfo(float).tiny)
+    flank = np.hypot(width, high)
+    at = place + 0.5 * width + tip_radius * high / flank
+    line = at * high / width - tip_radius * high**2 / (flank * (flank + width))
+    return np.asarray(np.maximum(arc, np.where((at >= 0.0) & (at <= width), line, 0.0)))
+
+
+def untouched_run(height: ArrayLike, tip_radius: float) -> FloatArray:
+    """Longest run of a slanted step whose flank the ball never touches, m: it leaves the trace of an upright one.
+
+    The ball that rests on the ground and on the upper edge lies on a flank of the slope sqrt(2 r h - h^2) / (r - h).
+    """
+    high = np.asarray(height, dtype=np.float64)
+    kink = contact_half_width(high, 0.0, tip_radius)
+    return np.asarray(high * np.clip(tip_radius - high, 0.0, None) / np.maximum(kink, np.finfo(float).tiny))
 
 
 def groove_height(

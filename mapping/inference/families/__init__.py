@@ -42,7 +42,11 @@ if TYPE_CHECKING:
         smooth_pit_beside as smooth_pit_beside,
         smooth_section as smooth_section,
     )
-    from mapping.inference.families.step import OffsetRims as OffsetRims, StepShape as StepShape
+    from mapping.inference.families.step import (
+        OffsetRims as OffsetRims,
+        StepShape as StepShape,
+        slanted_beside as slanted_beside,
+    )
     from mapping.inference.families.trapezoid import (
         FlatTopped as FlatTopped,
         FrustumShape as FrustumShape,
@@ -98,7 +102,7 @@ _PUBLIC = {
         "smooth_pit_beside",
         "smooth_section",
     ),
-    "step": ("OffsetRims", "StepShape"),
+    "step": ("OffsetRims", "StepShape", "slanted_beside"),
     "trapezoid": (
         "FlatTopped",
         "FrustumShape",

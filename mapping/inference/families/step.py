@@ -1,4 +1,4 @@
-"""StepShape: an upright step along a curve on the base; and a groove along its edge."""
+"""StepShape: an upright or slanted step along a curve on the base; and a groove along its edge."""
 
 from __future__ import annotations
 
@@ -11,7 +11,12 @@ import numpy as np
 from mapping import FloatArray
 from mapping.inference.curves import Chart, CurveModes
 from mapping.inference.families.nodes import LineShape, line_nodes
-from mapping.inference.likelihood import Prior, Window
+from mapping.inference.families.problem import Sizes
+from mapping.inference.likelihood import Prior, Uniform, Window
+
+# Climbs from this share of the disturbance's half-width to that one, all equally probable in their logarithm: as the
+# parts of a flat-topped section (`trapezoid`)
+NARROWEST_PART, WIDEST_PART = 0.01, 4.0
 
 
 class Upright(LineShape, Protocol):
@@ -28,7 +33,9 @@ class Upright(LineShape, Protocol):
 
 @dataclass(frozen=True, eq=False)
 class StepShape:
-    """Steps of any height: lateral modes of the edge, and the height.
+    """Steps of any height: lateral modes of the edge, and the height; of slanted ones the log run of the climb as well.
+
+    The course of a slanted step is the middle of its climb.
 
     `high_side` is +1 if the chart's lateral side is the high one, else -1. Whether the base lies low or high does
     not matter: the height of the base under each run is marginalised. `grooves` stay as they are, each with its
@@ -44,22 +51,28 @@ class StepShape:
     start: FloatArray
     step: FloatArray
     grooves: tuple[tuple[Upright, FloatArray], ...] = ()
+    slanted: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
-        return (*self.modes.names, "height")
+        return (*self.modes.names, "height", *(("log run",) if self.slanted else ()))
 
     @property
     def units(self) -> tuple[str, ...]:
-        return (*self.modes.units, "m")
+        return (*self.modes.units, "m", *(("ln m",) if self.slanted else ()))
+
+    def parts(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(W,) heights and runs of the climb, m."""
+        height = np.ascontiguousarray(theta[:, self.modes.count])
+        return height, np.exp(theta[:, -1]) if self.slanted else np.zeros(len(theta))
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights over the low side's trace, m."""
         from mapping.geometry.templates import step_heights
 
-        courses, heights = np.ascontiguousarray(theta[:, : self.modes.count]), np.ascontiguousarray(theta[:, -1])
+        courses, (heights, runs) = np.ascontiguousarray(theta[:, : self.modes.count]), self.parts(theta)
         out = np.empty((len(theta), len(self.window)))
-        step_heights(*self._places, courses, heights, self.high_side, self.tip_radius, out)
+        step_heights(*self._places, courses, heights, runs, self.high_side, self.tip_radius, out)
         for rims, (_, known) in zip(self._offset_rims, self.grooves, strict=True):
             out += rims.heights(np.hstack([np.tile(known, (len(theta), 1)), theta]))
         return out
@@ -74,6 +87,20 @@ class StepShape:
         """(n, nodes) lateral distances from the chart, (2, m, n, nodes) modes and slopes, and bends of the base."""
         _, lateral, basis, bend, _ = line_nodes(self.window, self.chart, self.modes, self.tip_radius)
         return lateral, basis, bend
+
+
+def slanted_beside(upright: StepShape, sizes: Sizes, untouched: float) -> StepShape:
+    """Slanted steps on the course of upright ones; all whose flank is never touched are one of these.
+
+    Args:
+        upright: the family.
+        sizes: preliminary ones.
+        untouched: longest run whose flank the ball never touches, m.
+    """
+    prior = Uniform(*np.log([max(untouched, NARROWEST_PART * sizes.half_width), WIDEST_PART * sizes.half_width]))
+    start = np.append(upright.start, 0.5 * (prior.low + prior.high))
+    priors = (*upright.priors, prior)
+    return replace(upright, priors=priors, start=start, step=np.append(upright.step, 0.1), slanted=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +140,11 @@ class OffsetRims:
             return out
         moved = courses[together].copy()
         moved[:, 0] += self._side * np.maximum(aside, 0.5 * width)[together]
-        deep, height = depth[together, None], edge[together, -1:]
+        deep, height = depth[together, None], self.edge.parts(edge[together])[0]
         wall = np.empty((len(moved), len(self.groove.window)))
         _, lateral, basis, bend, _ = self.groove.places
-        step_heights(lateral, basis, bend, moved, (height + deep)[:, 0], self._side, self.groove.tip_radius, wall)
+        upright, tip = np.zeros(len(moved)), self.groove.tip_radius
+        step_heights(lateral, basis, bend, moved, height + deep[:, 0], upright, self._side, tip, wall)
         wall -= deep
         alone = _templates(self.groove, groove[together]) if alone is None else alone[together]
         s = self.groove.places[0].mean(axis=1)

@@ -165,7 +165,7 @@ class JoinedShape:
                 continue
             s, along, aside = self._places_at(k, number)
             uphill = step.high_side * (aside - step.modes.lateral(own[number][:, : step.modes.count], along))
-            piece, lift = own[k].copy(), np.where((uphill > 0.0).any(axis=1), own[number][:, -1], 0.0)
+            piece, lift = own[k].copy(), np.where((uphill > 0.0).any(axis=1), step.parts(own[number])[0], 0.0)
             if "start" in shape.names:
                 first = shape.names.index("start")
                 low, high = _first_above(s, uphill), -_first_above(-s[::-1], uphill[:, ::-1])

@@ -143,6 +143,10 @@ class Kind:
         """
         return 0.0
 
+    def claims_more(self, shape: Shape) -> bool:
+        """True of a family that claims what a plainer rival does not: it is told only where that one is unlikely."""
+        return False
+
     def draws_of_height(self, shape: Shape, draws: FloatArray) -> FloatArray:
         """(S,) heights that draws (S, P) of one of the competing families say, m.
 

@@ -38,3 +38,13 @@ def test_a_slot_along_the_rows_is_a_feature_that_says_so_and_no_step_beside_it(t
     assert slot.kind == "groove" and abs(slot.width.median - 6.5e-3) < 40e-6
     (told,) = (each.reason for each in found.left_out if each.stage == ABSORBED)
     assert told.startswith("the groove at (") and "runs along the sweeps" in told
+
+
+def test_a_slope_that_the_base_follows_is_said(tmp_path: Path) -> None:
+    """It rises by 0.3 mm over 6 mm, under a ball of 0.5 mm: no step is as wide."""
+    x = 0.05 * np.arange(600)
+    z = 0.3 * np.clip((x - 13.0) / 6.0 + 0.5, 0.0, 1.0) + 1e-3 * np.random.default_rng(0).standard_normal(len(x))
+    np.savetxt(tmp_path / "slope.csv", np.column_stack([x, z]), delimiter=",", header="x [mm],z [mm]", comments="")
+    analysis = analyze(tmp_path / "slope.csv", tip_radius="0.5 mm", quick=True)
+    assert not analysis.model.features
+    assert any(" by 0.3 mm over 6 mm" in each.reason for each in analysis.left_out)

@@ -104,7 +104,7 @@ def test_an_edge_along_the_axis_falls_with_the_wall() -> None:
     out = np.empty((1, 51))
     lateral = WALL * np.sin(true_at / WALL)[:, None]
     straight = np.zeros((2, 0, 51, 1)), np.full((51, 1), 1 / WALL), np.zeros((1, 0))
-    step_heights(lateral, *straight, np.array([height]), 1.0, TIP, out)
+    step_heights(lateral, *straight, np.array([height]), np.zeros(1), 1.0, TIP, out)
     np.testing.assert_allclose(out[0], true, atol=5e-6)
 
 

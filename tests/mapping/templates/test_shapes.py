@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from scipy.ndimage import grey_dilation
 
 from mapping.errors import ShapeError
 from mapping.geometry.templates.shapes import (
@@ -17,6 +18,7 @@ from mapping.geometry.templates.shapes import (
     rim_height,
     sphere_height,
     step_height,
+    untouched_run,
 )
 
 TIP = 10e-3
@@ -115,6 +117,27 @@ def test_a_step_kinks_where_theory_says():
     s = step_height(x, h, TIP)
     assert s[0] == 0.0 and 0 < s[1] < 2e-6
     np.testing.assert_allclose(s[2:], h, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("height", "run"), [(0.3e-3, 2e-3), (0.3e-3, 0.4e-3), (0.7e-3, 0.5e-3), (0.05e-3, 4e-3)])
+def test_a_slanted_step_is_the_dilation_of_its_flank(height, run):
+    tip, fine = 0.5e-3, 1e-6
+    x = fine * np.arange(-4000, 4001)
+    ball = np.sqrt(tip**2 - (fine * np.arange(-499, 500)) ** 2) - tip
+    felt = grey_dilation(height * np.clip(x / run + 0.5, 0.0, 1.0), structure=ball, mode="nearest")
+    inner = np.abs(x) < 3e-3
+    # on a flank of slope s places a micrometre apart leave s^2 / 8 r of it: nanometres; on a wall a step of them
+    steep = height / run
+    np.testing.assert_allclose(step_height(x, height, tip, run)[inner], felt[inner], atol=2e-9 + steep * fine)
+
+
+def test_a_flank_that_is_never_touched_leaves_an_upright_step():
+    tip, height, x = 0.5e-3, 0.2e-3, np.linspace(-2e-3, 2e-3, 4001)
+    run = float(untouched_run(height, tip))
+    upright = step_height(x, height, tip)
+    np.testing.assert_allclose(step_height(x + 0.5 * run, height, tip, run), upright, atol=1e-12)
+    assert np.abs(step_height(x + 0.75 * run, height, tip, 1.5 * run) - upright).max() > 1e-6
+    assert untouched_run(2.0 * tip, tip) == 0.0
 
 
 def test_scaling_by_a_power_of_two_is_bit_exact():
