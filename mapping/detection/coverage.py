@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -11,7 +12,7 @@ from mapping.geometry.mesh import NEAREST_COST, BoxedPoints, by_shares
 
 # Samples of faces looked at, at most
 MOST_FACE_SAMPLES = 2_000_000
-# And of which is asked at once by how much they miss a ball: some 150 bytes each on the way, 10 MB
+# And of which is asked at once which ball is nearest, and how far they miss it: some 150 bytes each on the way, 10 MB
 PLACES_AT_ONCE = 2**16
 # Subdivisions of a side, at most: a face of so many already has 40 000 samples
 MOST_PARTS = 200
@@ -75,6 +76,8 @@ class FoundHeights:
 
     def at(self, places: BoolArray) -> FoundHeights:
         """Those of some places (N,) alone, and all faces."""
+        if places.all():  # as nearly always: no copy of up to 2 million
+            return self
         return FoundHeights(self.face, self.place[places], self.area[places], self.points[places], self.normals[places])
 
 
@@ -105,12 +108,15 @@ def found_heights(
         step *= 1.5
     normals = surface.face_normals[samples.owner]
     lost = lost_heights(samples.points, normals, touched, up, tip_radius)
-    low = np.minimum(lost, tip_radius)
-    further = np.sqrt(low * (2.0 * tip_radius - low)) + samples.gap
     worst = np.zeros(len(surface.faces))
-    np.maximum.at(worst, samples.owner, _lost_on_a_plane(further, tip_radius))
-    area = surface.face_areas[samples.owner] * samples.share
-    return FoundHeights(limit + worst, limit + lost, area, samples.points, normals)
+    for part in _parts(len(lost)):
+        low = np.minimum(lost[part], tip_radius)
+        further = np.sqrt(low * (2.0 * tip_radius - low)) + samples.gap[part]
+        np.maximum.at(worst, samples.owner[part], _lost_on_a_plane(further, tip_radius))
+    area = surface.face_areas[samples.owner]
+    area *= samples.share
+    lost += limit
+    return FoundHeights(limit + worst, lost, area, samples.points, normals)
 
 
 def lost_heights(
@@ -138,12 +144,18 @@ def lost_heights(
     def nearest(at: FloatArray) -> IntArray:
         return boxed.nearest(at, tip_radius)[1]
 
-    # the ball that would rest on a place tells on which side of a thin wall it is
-    index = by_shares(nearest, points + tip_radius * normals, NEAREST_COST)
-    passed = np.flatnonzero(index < len(centres))
-    for some in np.array_split(passed, 1 + len(passed) // PLACES_AT_ONCE):
-        lost[some] = _lost(centres[index[some]] - points[some], normals[some], tip_radius)
+    for part in _parts(len(points)):
+        # the ball that would rest on a place tells on which side of a thin wall it is
+        index = by_shares(nearest, points[part] + tip_radius * normals[part], NEAREST_COST)
+        passed = index < len(centres)
+        away = centres[index[passed]] - points[part][passed]
+        lost[part][passed] = _lost(away, normals[part][passed], tip_radius)
     return lost
+
+
+def _parts(count: int) -> Iterator[slice]:
+    """Runs of so many places, of which there may be 2 million: what is between their numbers is held of one run."""
+    return (slice(first, first + PLACES_AT_ONCE) for first in range(0, count, PLACES_AT_ONCE))
 
 
 def _lost(away: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
@@ -208,8 +220,9 @@ def face_samples(surface: Surface, spacing: float) -> FaceSamples:
     longest = _sides(corners).max(axis=1)
     thin = longest**2 > THIN * surface.face_areas
     parts = [_of_cells(corners[~thin], faces[~thin], longest[~thin], spacing)]
-    if thin.any():
-        parts.append(_of_columns(corners[thin], faces[thin], spacing))
+    if not thin.any():
+        return parts[0]
+    parts.append(_of_columns(corners[thin], faces[thin], spacing))
     columns = ([getattr(part, each.name) for part in parts] for each in fields(FaceSamples))
     return FaceSamples(*(np.concatenate(column) for column in columns))
 
@@ -275,12 +288,22 @@ def _of_columns(corners: FloatArray, faces: IntArray, spacing: float) -> FaceSam
     j = np.arange(len(column)) - np.repeat(np.cumsum(across) - across, across)
     of, x, m = part[column], x[column], across[column]
     y = (j + 0.5) / m * (1.0 - x)
-    points = np.tile(foot, (2, 1))[of] + x[:, None] * long[of] + y[:, None] * short[of]
     share = np.concatenate([split, 1.0 - split])[of] * (2.0 / n[column]) * (1.0 - x) / m
+    del j, m, column  # of up to 2 million points; so these are summed in place, too
+    points = np.tile(foot, (2, 1))[of]
+    points += _steps(long, of, x)
+    points += _steps(short, of, y)
     half = 0.5 * np.minimum(p / count, width)
     upwards = half * q / np.maximum(p, np.finfo(float).tiny) + 0.5 * np.minimum(q, width)
     gap = np.hypot(half, upwards).reshape(2, -1).max(axis=0)
     return FaceSamples(points, np.tile(faces, 2)[of], share, np.tile(gap, 2)[of])
+
+
+def _steps(legs: FloatArray, of: IntArray, shares: FloatArray) -> FloatArray:
+    """(N, 3) shares (N,) of those legs (P, 3), m."""
+    steps = legs[of]
+    steps *= shares[:, None]
+    return steps
 
 
 def _sides(corners: FloatArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -191,3 +192,24 @@ def test_samples_of_thin_faces_are_as_near_as_those_of_others_and_not_more() -> 
         assert (away[0] <= 1.02 * samples.gap[own][away[1]]).all() and away[0].max() < 1.1 * spacing
         mean = samples.share[own] @ samples.points[own]
         assert mean == pytest.approx(corners.mean(axis=0), abs=0.2 * spacing)
+
+
+def test_many_samples_of_thin_faces_need_little_more_memory_than_they_are() -> None:
+    x = np.linspace(0.0, 0.06, 61)
+    vertices = np.concatenate([np.column_stack([x, 0 * x + y, 0 * x]) for y in (0.0, 0.06)])
+    one = np.arange(60)
+    strips = np.concatenate([np.column_stack(each) for each in ((one, one + 1, one + 62), (one, one + 62, one + 61))])
+    surface = Surface(vertices, strips)
+    tracemalloc.start()
+    samples = face_samples(surface, 1e-4)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    held = sum(each.nbytes for each in vars(samples).values())
+    assert len(samples.owner) > 80_000
+    assert peak < 2.3 * held  # it was 2.8: five arrays as large as the points between
+
+
+def test_places_that_all_stay_are_not_copied() -> None:
+    found = found_heights(plate(), np.array([[0.03, 0.03, 0.0]]), np.array([[0.0, 0.0, 1.0]]), R)
+    assert found.at(np.ones(len(found.place), dtype=bool)) is found
+    assert len(found.at(np.isfinite(found.place)).place) == np.isfinite(found.place).sum() < len(found.place)
