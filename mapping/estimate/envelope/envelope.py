@@ -48,9 +48,9 @@ CAUTION = 2.0
 STEPS_TOLERATED = 2.0
 # More points of a mesh than this cost memory and minutes of curvature, on bodies that no picture shows so finely.
 MOST_POINTS = 300_000
-# Contacts that are laid out together before they are thinned: 60 MB with all that is known of them. One sweep of few
-# samples at a time would take as long again for the calls alone
-CONTACTS_AT_ONCE = 2**18
+# Contacts that are laid out together before they are thinned: 10 MB with all that is known of them, and twice that to
+# join and to thin them. One sweep of few samples at a time would take as long again for the calls alone
+CONTACTS_AT_ONCE = 2**16
 
 
 def estimate_surface(
@@ -225,8 +225,9 @@ def _possible(
     kept, sweeps = list[Estimate](), iter(sweeps)
     while some := _some(sweeps):
         points = Estimate.joined(some)
+        some.clear()
         possible = depth(points.points, slack) <= slack
-        kept.append(thinning.thin(points.select(np.flatnonzero(possible))))
+        kept.append(thinning.thin(points if possible.all() else points.select(np.flatnonzero(possible))))
     points = Estimate.joined(kept)
     if not len(points.points):
         raise EnvelopeError("every contact lies inside another ball: the trace is no ball's path; give its noise")

@@ -1,12 +1,14 @@
 """The estimated surface and its labels, against bodies whose traces have closed forms (theory section 4)."""
 
 import time
+import tracemalloc
 
 import numpy as np
 import pytest
 
 from mapping.estimate.envelope import envelope
 from mapping.estimate.envelope.envelope import BRIDGED, EXTRAPOLATED, TOUCHED, EnvelopeError, estimate_surface
+from mapping.estimate.envelope.estimate import Estimate
 from mapping.geometry.contact.first_contact import BallContact
 from mapping.instrument.noise import Noise
 from mapping.surface import Surface
@@ -361,6 +363,23 @@ def test_sweeps_laid_out_one_by_one_become_the_same_surface_as_all_at_once(cross
     np.testing.assert_array_equal(one_by_one.labels, at_once.labels)
     np.testing.assert_array_equal(one_by_one.sample, at_once.sample)
     assert not (one_by_one.sweep == 5000).any()
+
+
+def test_contacts_of_long_recordings_are_thinned_before_the_next_are_laid_out():
+    def sweeps():
+        for number in range(16):
+            x = np.linspace(0.0, 1.0, 2**15)
+            points = np.column_stack([x, np.full_like(x, 0.1 * number), 0 * x])
+            up, sample = np.broadcast_to([0.0, 0.0, 1.0], points.shape), np.arange(len(x))
+            row = np.zeros(len(x), dtype=np.int8), sample, np.full(len(x), number)
+            yield Estimate.unproven(points, up, points + up, *row, up)
+
+    tracemalloc.start()
+    points = envelope._possible(sweeps(), lambda at, slack: np.zeros(len(at)), 0.0, envelope._Thinning(0.01, True))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(points.points) == 16 * 101
+    assert peak < 50e6  # all of them are 70 MB, and were joined and thinned by a quarter of a million
 
 
 def test_of_too_many_points_there_remain_as_many_as_anybody_sees(monkeypatch):
