@@ -13,7 +13,7 @@ from explore3d.analysis import ABSORBED, FAILED, Analysis, swept_share
 from mapping import Feature, length_text, place_text
 from mapping.detection import CLEAR, LARGEST, groove_dip, narrowest_groove
 from mapping.detection.path import PathLedger
-from mapping.inference.configuration import NUMBER_OPEN, numbers_in
+from mapping.inference.configuration import UNEXPLAINED, numbers_in
 from mapping.model import probability
 
 # One and several of each reason for which a sweep is cut
@@ -163,7 +163,7 @@ def warnings(analysis: Analysis) -> list[str]:
         *path_warning(analysis),
         *form_warnings(analysis),
         *misfit_warnings(analysis),
-        *open_number_warnings(analysis),
+        *unexplained_warnings(analysis),
         *posterior_warnings(analysis),
         *dropped_warning(analysis),
         *warning_lines(analysis),
@@ -235,13 +235,13 @@ def misfit_warnings(analysis: Analysis) -> list[str]:
     )
 
 
-def open_number_warnings(analysis: Analysis) -> list[str]:
-    """Features whose number the trace contradicts, and whose own form is not what it contradicts."""
+def unexplained_warnings(analysis: Analysis) -> list[str]:
+    """Features beside which more was felt than is told, where that is not known to be their own form."""
     return _feature_warnings(
         [
-            (feature, NUMBER_OPEN)
+            (feature, UNEXPLAINED)
             for feature in analysis.model.features
-            if NUMBER_OPEN in feature.notes and not feature.details.misfit
+            if UNEXPLAINED in feature.notes and not feature.details.misfit
         ]
     )
 

@@ -18,13 +18,13 @@ from explore3d.report.findings import (
     misfit_warnings,
     number_text,
     numbers_found,
-    open_number_warnings,
     path_sentence,
     path_warning,
     stop_lines,
     swept_part,
     tip_warning,
     undecided_text,
+    unexplained_warnings,
     warning_lines,
     yielding_sentence,
 )
@@ -120,7 +120,7 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
         content.extend([element("p", warning, class_="warning")] if warning else [])
         content.append(paragraph(analysis.account.sentence()))
     content.extend(element("p", each, class_="warning") for each in form_warnings(analysis))
-    wrong = [*misfit_warnings(analysis), *open_number_warnings(analysis)]
+    wrong = [*misfit_warnings(analysis), *unexplained_warnings(analysis)]
     content.extend(element("p", each, class_="warning") for each in wrong)
     content.extend(element("p", each, class_="warning") for each in dropped_warning(analysis))
     if analysis.path is not None:

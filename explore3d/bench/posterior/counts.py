@@ -23,7 +23,7 @@ from mapping import Feature, FloatArray, Interval, Support
 from mapping.assembly import assemble
 from mapping.base import LaidTrace
 from mapping.detection import detect
-from mapping.inference.configuration import NUMBER_OPEN, PROPOSALS, numbers_in
+from mapping.inference.configuration import PROPOSALS, UNEXPLAINED, numbers_in
 from mapping.inference.kinds import feature_trace, kind_made_of
 
 # Sweeps over a square of twice this, m, one pitch apart; details stay inside by the margin
@@ -79,7 +79,7 @@ def run_counts(seed: int, without: str = "") -> CountCase:
     laid = LaidTrace.of(trace, base)
     proposals = [proposal for proposal in PROPOSALS if proposal.name != without]
     features = assemble(detect(laid, base), laid, base, proposals=proposals)
-    seconds, left_open = time.process_time() - start, any(NUMBER_OPEN in feature.notes for feature in features)
+    seconds, left_open = time.process_time() - start, any(UNEXPLAINED in feature.notes for feature in features)
     return CountCase(seed, true, stated_counts(features), seconds, without, left_open)
 
 

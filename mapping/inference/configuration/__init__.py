@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.inference.configuration.account import NUMBER_OPEN as NUMBER_OPEN, accounted as accounted
+    from mapping.inference.configuration.account import UNEXPLAINED as UNEXPLAINED, accounted as accounted
     from mapping.inference.configuration.neighbourhood import Places as Places
     from mapping.inference.configuration.proposals import PROPOSALS as PROPOSALS, Proposal as Proposal
     from mapping.inference.configuration.told import (
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mapping.inference.configuration.wide_lines import is_two as is_two
 
 _PUBLIC = {
-    "account": ("NUMBER_OPEN", "accounted"),
+    "account": ("UNEXPLAINED", "accounted"),
     "neighbourhood": ("Places",),
     "proposals": ("PROPOSALS", "Proposal"),
     "told": ("in_words", "numbers_in", "share_as_told"),

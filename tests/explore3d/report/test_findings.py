@@ -13,7 +13,7 @@ from mapping import Dropped, Posterior, place_text
 from mapping.detection.path import PathLedger
 from mapping.estimate.envelope import RefutedTip
 from mapping.feature import Interval
-from mapping.inference.configuration import NUMBER_OPEN
+from mapping.inference.configuration import UNEXPLAINED
 
 
 def feature(name: str, finer: bool, length: Interval) -> SimpleNamespace:
@@ -248,7 +248,7 @@ def test_a_doubt_of_the_tip_that_was_assumed_is_said() -> None:
 
 def test_an_open_number_is_a_warning_unless_the_features_own_form_is_what_is_wrong() -> None:
     ridge, groove = (feature(name, True, Interval(0.01, 0.01, 0.01)) for name in ("ridge-1", "groove-1"))
-    ridge.notes = groove.notes = (NUMBER_OPEN,)
+    ridge.notes = groove.notes = (UNEXPLAINED,)
     groove.details.misfit = "no ideal groove fits"
     said = warnings(analysis(ridge, groove))
-    assert [each for each in said if NUMBER_OPEN in each] == [f"Warning: ridge-1: {NUMBER_OPEN}."]
+    assert [each for each in said if UNEXPLAINED in each] == [f"Warning: ridge-1: {UNEXPLAINED}."]
