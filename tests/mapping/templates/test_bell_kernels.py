@@ -51,7 +51,7 @@ def test_the_trace_is_the_highest_place_of_the_ball(height: float, scale: float,
     assert np.sort(off)[-3] < 5e-5 and off.max() < 2e-3
 
 
-@pytest.mark.parametrize("curvature", [-0.3, -0.1, 0.2, 0.6])
+@pytest.mark.parametrize("curvature", [-0.3, *(pytest.param(k, marks=pytest.mark.slow) for k in (-0.1, 0.2)), 0.6])
 @pytest.mark.parametrize(("height", "scale", "taper"), [(0.2, 0.4, -0.4), (0.1, 0.1, 1.0), (0.05, 0.5, 0.1)])
 def test_on_a_round_base_it_stands_on_the_ball(curvature: float, height: float, scale: float, taper: float) -> None:
     radius, away = 1.0 / curvature, np.linspace(0.0, 1.2, 25)

@@ -35,7 +35,9 @@ def test_sets_for_building_and_for_reporting_have_no_seed_and_no_size_in_common(
     assert len(np.unique(reported.trace.sweep)) == 20 and len(np.unique(felt_shape("L", 0).trace.sweep)) == 40
 
 
-@pytest.mark.parametrize("name", ["on a saddle", "on a cone", "in a fillet"])
+@pytest.mark.parametrize(
+    "name", ["on a cone", *(pytest.param(each, marks=pytest.mark.slow) for each in ("on a saddle", "in a fillet"))]
+)
 def test_no_centre_is_nearer_to_wire_or_body_than_it_can_be_and_each_touches_one(name: str) -> None:
     felt, shape = felt_shape(name, 1), FELT_SHAPES[name]
     rng = np.random.default_rng(0)

@@ -85,7 +85,7 @@ class Fragile(Folder):
         super().remove(name)
 
 
-@pytest.mark.parametrize("changes", [0, 1, 2, 3, 4, 17, 50])
+@pytest.mark.parametrize("changes", [0, 3, 50, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, 4, 17))])
 def test_a_kill_while_runs_are_put_together_is_mended_by_the_next_to_open(
     many: Path, tmp_path: Path, changes: int
 ) -> None:
