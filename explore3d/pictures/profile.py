@@ -10,6 +10,7 @@ from explore3d.pictures.chart import DASHED, Panel, sheet
 from explore3d.pictures.figure import ESTIMATED, INK, MUTED, TRACED
 from mapping import Feature, FloatArray, Trace, length_text, length_unit
 from mapping.base import Base, LaidTrace
+from mapping.geometry.mesh import middle
 
 PROFILE_WIDTH = 1060.0  # px
 PROFILE_HEIGHT = 300.0  # of each of its two panels, px
@@ -82,7 +83,7 @@ def _heights(
     )
     panel.level(0.0, INK, width=0.8)
     panel.line(*thinned(x, height / factor), TRACED, width=0.8, name="height over the base")
-    places = np.array([(feature.axis[0] - origin) @ heading / x_factor for feature in features])
+    places = np.array([(middle(feature.axis)[0] - origin) @ heading / x_factor for feature in features])
     crests = np.array([feature.height.median / factor for feature in features])
     finer = np.array([feature.curvature_feature for feature in features], dtype=bool)
     for mask, filled, label in ((finer, True, "finer than the tip"), (~finer, False, "gentler than the tip")):

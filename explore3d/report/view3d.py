@@ -14,6 +14,7 @@ from explore3d.pictures import SweepPath, profile_line, thinned, view_directions
 from explore3d.report.markup import Html, data_script, element, script, text
 from mapping import Feature, FloatArray, Surface, Trace, length_unit
 from mapping.base import Base, LaidTrace
+from mapping.geometry.mesh import middle
 from mapping.inference.kinds import kind_of, sizes_of
 from mapping.model import drawn_at_least, feature_mesh
 
@@ -98,7 +99,7 @@ def profile_view(trace: Trace, base: Base, features: Sequence[Feature]) -> Html:
         "features": [
             {
                 "id": each.id,
-                "x": float((each.axis[0] - origin) @ heading) / x_factor,
+                "x": float((middle(each.axis)[0] - origin) @ heading) / x_factor,
                 "y": float(each.height.median) / factor,
                 "finer": each.curvature_feature,
                 "text": hover_text(each),

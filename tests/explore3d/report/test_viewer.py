@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,10 @@ from reported_wire import BASE, ridge
 from explore3d.pictures.camera import Camera
 from explore3d.pictures.sweep_paths import SweepPath
 from explore3d.report import view3d
-from explore3d.report.view3d import lighter, object_view
+from explore3d.report.view3d import lighter, object_view, profile_view
 from mapping.model.object_model import ObjectModel
 from mapping.surface import Surface
+from mapping.trace import Trace
 
 SCRIPTS = Path(view3d.__file__).parent
 UP = np.array([0.0, 0.0, 1.0])
@@ -108,6 +110,15 @@ def test_the_whole_object_is_in_the_first_view() -> None:
         seen = np.array(told("viewer.js", f"{json.dumps(corners)}.map(p => v.seenAt(p, {call}, {width}, {height}))"))
         assert (seen > 0).all() and (seen < [width, height]).all()
         assert (np.ptp(seen, axis=0) / [width, height]).max() > 0.5
+
+
+def test_a_line_across_a_profile_is_marked_where_the_profile_meets_it_however_it_lies() -> None:
+    x = np.linspace(-0.03, 0.03, 601)
+    centers = np.column_stack([x, np.zeros_like(x), np.full_like(x, 0.01)])
+    trace = Trace(x - x[0], centers, np.zeros(len(x), dtype=np.int64), 0.01)
+    slanted = replace(ridge(), axis=np.array([[0.016, -0.001, 0.0], [0.014, 0.001, 0.0]]), normals=np.array([UP, UP]))
+    (marked,) = data_of(str(profile_view(trace, BASE, [slanted])))["features"]
+    assert marked["x"] == pytest.approx(15.0)
 
 
 @node
