@@ -62,9 +62,21 @@ class StepShape:
         return (*self.modes.units, "m", *(("ln m",) if self.slanted else ()))
 
     def parts(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(W,) heights and runs of the climb, m."""
+        """(W,) heights and runs of the climb, squarely across the edge, m."""
         height = np.ascontiguousarray(theta[:, self.modes.count])
-        return height, np.exp(theta[:, -1]) if self.slanted else np.zeros(len(theta))
+        return height, self.climbs(theta) * self._squareness(theta)
+
+    def climbs(self, theta: FloatArray) -> FloatArray:
+        """(W,) runs of the climb across the edge, m; of a lone sweep along that, which knows no other."""
+        return np.exp(theta[:, -1]) if self.slanted else np.zeros(len(theta))
+
+    def _squareness(self, theta: FloatArray) -> FloatArray | float:
+        """What a climb takes across the edge, in shares of the parameter: a lone sweep tells how long its own way up is
+        and hardly the edge's heading, and a chain would follow one along the other."""
+        if len(self.window.starts) > 2:
+            return 1.0
+        slope = self.modes.slope(theta[:, : self.modes.count], self.modes.middle)
+        return np.asarray(1.0 / np.sqrt(1.0 + slope**2))
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights over the low side's trace, m."""

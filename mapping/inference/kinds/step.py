@@ -82,11 +82,11 @@ class Step(LineKind):
 
     def widths_felt(self, shape: Any, draws: FloatArray, *, half_way: bool = False) -> tuple[FloatArray, FloatArray]:
         """Those of the climb; none of an upright step."""
-        width = (0.5 if half_way else 1.0) * _climbs(shape, draws)
+        width = (0.5 if half_way else 1.0) * shape.climbs(draws)
         return width, width
 
     def section(self, feature: Feature, shape: Any, draws: FloatArray) -> Section:
-        sign, run = 1.0 if feature.height.median >= 0.0 else -1.0, _climbs(shape, draws)
+        sign, run = 1.0 if feature.height.median >= 0.0 else -1.0, shape.climbs(draws)
         known = {"high_side": shape.high_side, "run": float(np.median(run)) if shape.slanted else None}
         return Section(Interval.from_draws(sign * shape.parts(draws)[0]), Interval.from_draws(run), known)
 
@@ -112,15 +112,6 @@ class Step(LineKind):
     def outline(self, height: float, width: float) -> tuple[FloatArray, bool]:
         """A wall."""
         return np.array([[0.0, 0.0], [0.0, height]]), False
-
-
-def _climbs(shape: StepShape, draws: FloatArray) -> FloatArray:
-    """(S,) runs of draws (S, P), m; of a lone sweep, which says little of how the edge lies, along it."""
-    run = shape.parts(draws)[1]
-    if len(shape.window.starts) > 2:
-        return run
-    slope = shape.modes.slope(draws[:, : shape.modes.count], shape.modes.middle)
-    return np.asarray(run * np.sqrt(1.0 + slope**2))
 
 
 def _rough_fits(shape: StepShape, theta: FloatArray) -> FloatArray:
