@@ -104,7 +104,7 @@ def test_a_machine_is_given_what_it_touches_from_above(tmp_path: Path) -> None:
     assert plan.account.area == pytest.approx(0.06 * 0.04)
 
 
-@pytest.mark.parametrize("radius", [1, 3])
+@pytest.mark.parametrize("radius", [1, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_peck_s_way_leads_over_an_inner_corner(radius: int, tmp_path: Path) -> None:
     outline = [(0, 0), (60, 0), (60, 6), (6, 6), (6, 50), (0, 50)]
     corners = [(x, y, z) for y in (0, 40) for x, z in outline]

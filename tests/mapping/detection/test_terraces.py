@@ -39,7 +39,7 @@ def places(detections: Detections, *kinds: str) -> list[list[float]]:
     return [sorted(float(c.point[0]) for c in own) for own in of]
 
 
-@pytest.mark.parametrize("height", [0.05e-3, pytest.param(0.3e-3, marks=pytest.mark.slow), 2e-3])
+@pytest.mark.parametrize("height", [*(pytest.param(mm * 1e-3, marks=pytest.mark.slow) for mm in (0.05, 0.3)), 2e-3])
 def test_every_line_crosses_the_step_and_nothing_else(height: float) -> None:
     detections = found(lambda x: step_height(x - 3.3e-3, height, TIP))
     assert len(detections.crossings) == LINES
@@ -119,7 +119,7 @@ def test_a_plateau_too_narrow_for_a_terrace_has_two_edges_however_it_is_noisy(se
     assert len(detections.crossings) == 2 * LINES
 
 
-@pytest.mark.parametrize("spacing", [0.3, 0.5, 0.9])
+@pytest.mark.parametrize("spacing", [0.3, pytest.param(0.5, marks=pytest.mark.slow), 0.9])
 def test_a_step_of_a_coarse_raster_is_one_step(spacing: float) -> None:
     trace = raster(lambda x: step_height(x - 3.3e-3, 0.6e-3, TIP), spacing=spacing * TIP)
     base = fit_base(trace)
@@ -167,7 +167,7 @@ def test_a_slot_too_narrow_for_a_terrace_has_its_edges_at_its_rims() -> None:
     assert len(detections.crossings) == 2 * LINES
 
 
-@pytest.mark.parametrize("second", [0.2e-3, -0.12e-3])
+@pytest.mark.parametrize("second", [pytest.param(0.2e-3, marks=pytest.mark.slow), -0.12e-3])
 def test_a_short_terrace_between_two_others_is_a_stair_and_its_edges_are_two_steps(second: float) -> None:
     """Three radii wide: as a detail of one level it would have to lie on the same level on both sides."""
 

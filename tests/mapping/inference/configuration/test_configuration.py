@@ -379,7 +379,9 @@ def test_details_that_hide_each_other_are_counted() -> None:
 @pytest.mark.parametrize(
     ("seed", "true"),
     [
-        (21, 5),  # a bump of 0.45 mm at the end of a wire of 0.18 mm: added as high as it stood off, it lay beneath
+        pytest.param(
+            21, 5, marks=pytest.mark.slow
+        ),  # a bump of 0.45 mm at the end of a wire of 0.18 mm: added as high as it stood off, it lay beneath
         (24, 3),  # two bumps that three rows feel as one line
     ],
 )
