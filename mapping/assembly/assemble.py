@@ -23,15 +23,13 @@ from mapping.base import Base, LaidTrace
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import SHAPE_ERROR
-from mapping.inference.configuration import PROPOSALS, Places, Proposal, accounted, is_two
+from mapping.inference.configuration import NEIGHBOURHOOD_REACH, PROPOSALS, Places, Proposal, accounted, is_two
 from mapping.inference.families import Surroundings
 from mapping.inference.kinds import kind_made_of, kind_of
 
 # A crossing lower than this share of its group's is an outlier if it lies so many half-widths off the others, and so
 # many from any other low one; where others are so many that they are a line, not a spot with low rims.
 STRAY, STRAY_DISTANCE, MATES, LINE = 0.6, 1.3, 3.0, 5
-# Half-widths beside a crest in which its shape may be wrong: as far again as a sharp one disturbs
-MISFIT_REACH = 2.0
 
 
 def assemble(
@@ -288,7 +286,7 @@ def _scale(crossings: Sequence[Crossing], tip_radius: float) -> float:
     points = np.array([c.point for c in crossings])
     own = np.ones(len(crossings), dtype=bool)
     for k in np.flatnonzero(heights < SHAPE_ERROR * heights.max()):
-        reach = MISFIT_REACH * np.sqrt(2.0 * tip_radius * heights)
+        reach = NEIGHBOURHOOD_REACH * np.sqrt(2.0 * tip_radius * heights)
         beside = np.linalg.norm(points - points[k], axis=1) < reach
         own[k] = not (beside & (SHAPE_ERROR * heights > heights[k])).any()
     return float(np.sqrt(2 * tip_radius * np.median(heights[own])))

@@ -6,7 +6,10 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from mapping.inference.configuration.account import UNEXPLAINED as UNEXPLAINED, accounted as accounted
-    from mapping.inference.configuration.neighbourhood import Places as Places
+    from mapping.inference.configuration.neighbourhood import (
+        NEIGHBOURHOOD_REACH as NEIGHBOURHOOD_REACH,
+        Places as Places,
+    )
     from mapping.inference.configuration.proposals import PROPOSALS as PROPOSALS, Proposal as Proposal
     from mapping.inference.configuration.told import (
         in_words as in_words,
@@ -17,7 +20,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "account": ("UNEXPLAINED", "accounted"),
-    "neighbourhood": ("Places",),
+    "neighbourhood": ("NEIGHBOURHOOD_REACH", "Places"),
     "proposals": ("PROPOSALS", "Proposal"),
     "told": ("in_words", "numbers_in", "share_as_told"),
     "wide_lines": ("is_two",),

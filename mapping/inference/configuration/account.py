@@ -239,7 +239,7 @@ def _improved(
     ]
     found = searched(start, parts, np.array(points).reshape(-1, 3), proposals)
     odds = _told(found)
-    noted = (*((ENDED_EARLY,) if found.bounded else ()), *(() if found.best.fits else (UNEXPLAINED,)))
+    noted = tuple(note for note, is_so in ((ENDED_EARLY, found.bounded), (UNEXPLAINED, not found.best.fits)) if is_so)
     odds = odds if found.best.fits else ()  # among configurations that are all wrong none is probable
     # a section or a course alone is the posterior's to choose
     adds = len(found.best.kinds) > len(found.start.kinds)
