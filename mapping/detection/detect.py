@@ -23,7 +23,6 @@ from mapping.detection.filters import (
 from mapping.detection.outliers import outliers
 from mapping.detection.paper_algorithms import along_chord, curvature_features
 from mapping.detection.quiet_noise import (
-    CONTACT_ROUNDING,
     RAW_SAMPLES,
     SMALLEST_CREST_SNR,
     Background,
@@ -34,7 +33,7 @@ from mapping.detection.quiet_noise import (
     raw_stretches,
 )
 from mapping.detection.terraces import Terraced, terraced
-from mapping.instrument import ROWS_THAT_SHARE, Levels, Noise, Row, StatedNoise, unshared
+from mapping.instrument import CONTACT_ROUNDING, ROWS_THAT_SHARE, Levels, Noise, Row, StatedNoise, unshared
 
 # Half-width of the widest disturbance that counts as fine, in tip radii.
 LARGEST = 4.0

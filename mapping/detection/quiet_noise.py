@@ -16,10 +16,18 @@ from mapping import BoolArray, FloatArray
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights
 from mapping.detection.candidates import Suspects, suspects
 from mapping.detection.filters import Bank, build_bank, false_alarms_over, filter_sd, smallest_half_width
-from mapping.instrument import Blocks, Noise, NoiseFit, StatedNoise, estimate_noise, fit_noise, perturbed, relative_sd
+from mapping.instrument import (
+    CONTACT_ROUNDING,
+    Blocks,
+    Noise,
+    NoiseFit,
+    StatedNoise,
+    estimate_noise,
+    fit_noise,
+    perturbed,
+    relative_sd,
+)
 
-# Rounding of contact geometry, in tip radii: the noise is never taken to be smaller.
-CONTACT_ROUNDING = 1e-8
 # Signal-to-noise ratio of the smallest crest looked for, and of what is kept out of the noise's estimate.
 SMALLEST_CREST_SNR = 5.0
 SUSPECT = 3.5

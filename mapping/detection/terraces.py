@@ -14,7 +14,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray, IntArray
 from mapping.base import Base, SweepHeights
 from mapping.detection.cap_fit import Disturbance, fit_cap
-from mapping.instrument import FEATURE_RESIDUAL_SDS, Noise, neighbour_scatter, running_mean
+from mapping.instrument import CONTACT_ROUNDING, FEATURE_RESIDUAL_SDS, Noise, neighbour_scatter, running_mean
 
 # A sweep runs on a level if it keeps to it for so many tip radii, the half-width of the widest detail that is sought:
 # what is narrower is one on the level below. On either side of an edge as much is looked at, of which the arc about it
@@ -107,7 +107,7 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
     smooth = running_mean(profile.height, int(MEAN * tip_radius / profile.spacing))
     own = np.abs(smooth[:, None] - levels)
     # bins finer than the sampling are filled in: these scatter by nothing
-    noise = neighbour_scatter(profile.height[np.diff(profile.first) > 0])
+    noise = max(neighbour_scatter(profile.height[np.diff(profile.first) > 0]), CONTACT_ROUNDING * tip_radius)
     on = FEATURE_RESIDUAL_SDS * noise
     # what is as near to a level on an arc of the ball, whose top it may be, and as far again as means reach
     passed = int((2.0 * np.sqrt(tip_radius * on) + 2.0 * MEAN * tip_radius) / profile.spacing)

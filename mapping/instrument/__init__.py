@@ -19,7 +19,11 @@ if TYPE_CHECKING:
     )
     from mapping.instrument.core import core_of as core_of, fit_on_densest as fit_on_densest, span_of as span_of
     from mapping.instrument.levels import Levels as Levels
-    from mapping.instrument.noise import Noise as Noise, estimate_noise as estimate_noise
+    from mapping.instrument.noise import (
+        CONTACT_ROUNDING as CONTACT_ROUNDING,
+        Noise as Noise,
+        estimate_noise as estimate_noise,
+    )
     from mapping.instrument.noise_fit import fit_noise as fit_noise
     from mapping.instrument.robust import (
         BISQUARE as BISQUARE,
@@ -43,7 +47,7 @@ _PUBLIC = {
     "core": ("core_of", "fit_on_densest", "span_of"),
     "levels": ("Levels",),
     "noise_fit": ("fit_noise",),
-    "noise": ("Noise", "estimate_noise"),
+    "noise": ("CONTACT_ROUNDING", "Noise", "estimate_noise"),
     "robust": (
         "BISQUARE",
         "FEATURE_RESIDUAL_SDS",

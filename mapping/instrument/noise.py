@@ -15,6 +15,9 @@ from mapping.instrument.robust import robust_sd
 from mapping.instrument.states import point_steps
 from mapping.instrument.term import Term
 
+# Rounding of contact geometry, in tip radii: noise is never taken to be smaller.
+CONTACT_ROUNDING = 1e-8
+
 # A correlated part must lower chi-square by this much, or the noise counts as white.
 LEAST_CHI_SQUARE_GAIN = 6.0
 

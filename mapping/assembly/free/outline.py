@@ -9,7 +9,7 @@ import numpy as np
 from mapping import FloatArray
 from mapping.assembly.free.section import FLANK, Section, flanks
 from mapping.base import SHORTEST_LEVEL, SweepHeights
-from mapping.instrument import core_of, neighbour_scatter, span_of
+from mapping.instrument import CONTACT_ROUNDING, core_of, neighbour_scatter, span_of
 
 # Widths of a crest of no width of its own, felt at the same share of the height, from which on the trace is the
 # section: what is felt is then mostly the detail's own. Below, families know what the ball hides. Over 80 scratches
@@ -69,7 +69,7 @@ def overlap(one: Section, other: Section) -> bool:
 def _sections(piece: SweepHeights, tip_radius: float, longest: float, least: float, alone: bool) -> list[Section]:
     """What stands clear of the usual scatter of a profile, and is wide, up to `longest`, m."""
     z, found = piece.height, []
-    smallest = max(neighbour_scatter(z), np.finfo(float).tiny)
+    smallest = max(neighbour_scatter(z), CONTACT_ROUNDING * tip_radius)
     # of a rack two thirds are wide details: their own heights are not what the rest scatters by
     usual = core_of(z, smallest, span_of(z, smallest)).sd
     for sign in (1.0, -1.0):

@@ -174,8 +174,18 @@ class _Stretch:
         if run is None:
             least[1], most[1] = 0.0, np.log(self.span / self.spacing)
         inner = 1e-3 * np.minimum(most - least, 1.0)
-        robust: dict[str, Any] = {"loss": "soft_l1", "f_scale": CLIMB_OUTLIER, "bounds": (least, most), "args": (run,)}
-        ends = [least_squares(self._off, np.clip(each, least + inner, most - inner), **robust) for each in starts]
+        robust: dict[str, Any] = {"loss": "soft_l1", "bounds": (least, most), "args": (run,)}
+
+        def descended(start: FloatArray, outlier: float) -> Any:
+            return least_squares(self._off, np.clip(start, least + inner, most - inner), f_scale=outlier, **robust)
+
+        # of a profile without noise all that a start misses counts by its size, and no descent ends there: first, so
+        # much of it does not as half of it is
+        apart = [max(float(np.median(np.abs(self._off(each, run)))), CLIMB_OUTLIER) for each in starts]
+        near = [
+            descended(each, off).x if off > CLIMB_OUTLIER else each for each, off in zip(starts, apart, strict=True)
+        ]
+        ends = [descended(each, CLIMB_OUTLIER) for each in near]
         return np.asarray(min(ends, key=lambda end: float(end.cost)).x)
 
     @property

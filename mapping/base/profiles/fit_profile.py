@@ -14,9 +14,17 @@ from mapping.base.profiles.evidence import Scatter
 from mapping.base.profiles.form import AUTO, Form, form_line
 from mapping.base.profiles.frame import ProfileFrame
 from mapping.base.profiles.isolated_bends import Bend, isolated_bends, isolated_rest
-from mapping.base.profiles.jumps import MOST_JUMPS, possible_jumps, told_apart
+from mapping.base.profiles.jumps import MOST_JUMPS, SHORTEST_LEVEL, possible_jumps, told_apart
 from mapping.geometry.mesh import Spline, spline_design
-from mapping.instrument import RobustFit, fit_on_densest, neighbour_scatter, robust_fit, robust_scale, span_of
+from mapping.instrument import (
+    CONTACT_ROUNDING,
+    RobustFit,
+    fit_on_densest,
+    neighbour_scatter,
+    robust_fit,
+    robust_scale,
+    span_of,
+)
 
 # A base bends over no less than this many tip radii: shorter details are features.
 SHORTEST_BEND = 8.0
@@ -92,7 +100,9 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
     bends = isolated_bends(x, z, curve(x), scale) if pieces > 1 else []
     rest = isolated_rest(x, z, curve(x), scale, SHORTEST_BEND * trace.tip_radius)
     if edges:
-        fitted["levels"] = told_apart(heights, scatter.within(best.residual)).tolist()
+        # heights over a base are normal to it: the frame leans by the step itself
+        lean = float(np.median(np.hypot(1.0, curve.slope(x))))
+        fitted["levels"] = (told_apart(heights, scatter.within(best.residual)) / lean).tolist()
     for name, some, up in (("climbs", edges, rise), ("slopes", slopes.edges, slopes.rises)):
         told = zip(some, up.tolist(), strict=True)
         fitted |= _listed(name, [Bend(h, each.run, each.place) for each, h in told if each.run > 0.0], frame, curve)
@@ -145,7 +155,7 @@ def _likeliest(
     Its further coefficients are the edges' heights. What slanted edges lead to and back from is no level but a detail.
     """
     upright = [Edge.upright(int(i)) for i in possible_jumps(x, z, scale, tip_radius)]
-    least = max(scale, LEAST_DIGITS * float(np.abs(z).max()), np.finfo(float).tiny)
+    least = max(scale, CONTACT_ROUNDING * tip_radius, LEAST_DIGITS * float(np.abs(z).max()))
     slanted = possible_climbs(x, z, samples, _scatter(splines, x, z, upright, least, tip_radius)[0], least, tip_radius)
     while slanted:
         found = fit, spline, edges, scatter = _chosen(splines, x, z, [*slanted, *upright], least, tip_radius)
@@ -248,18 +258,25 @@ def _listed(name: str, bends: list[Bend], frame: ProfileFrame, curve: _Line) -> 
 
 
 def _cell_medians(x: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Medians over PROFILE_CELLS cells of equal length, in the order of x: details narrower than a cell vanish."""
+    """Medians over PROFILE_CELLS cells of equal length, in the order of x: details narrower than a cell vanish.
+
+    Of heights over the usual slope: a frame that leans, as a step makes it, would else put cells of an even number of
+    samples beside those of an odd one, and an exact profile's levels off any line.
+    """
+    order = np.argsort(x, kind="stable")
+    x, z = x[order], z[order]
     if len(x) <= 4 * PROFILE_CELLS:
-        order = np.argsort(x, kind="stable")
-        return x[order], z[order]
-    edges = np.linspace(x.min(), x.max(), PROFILE_CELLS + 1)
+        return x, z
+    apart = int(SHORTEST_LEVEL * len(x))
+    slope = float(np.median((z[apart:] - z[:-apart]) / np.maximum(x[apart:] - x[:-apart], np.finfo(float).tiny)))
+    over = z - slope * x
+    edges = np.linspace(x[0], x[-1], PROFILE_CELLS + 1)
     cell = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, PROFILE_CELLS - 1)
-    order = np.lexsort((z, cell))
-    starts = np.flatnonzero(np.diff(cell[order], prepend=-1))
+    starts = np.flatnonzero(np.diff(cell, prepend=-1))
     counts = np.diff(np.append(starts, len(x)))
-    middle = order[starts + counts // 2]
-    mean_x = np.add.reduceat(x[order], starts) / counts
-    return np.asarray(mean_x), z[middle]
+    middle = np.lexsort((over, cell))[starts + counts // 2]
+    mean_x = np.add.reduceat(x, starts) / counts
+    return np.asarray(mean_x), np.asarray(over[middle] + slope * mean_x)
 
 
 def _ribbon(tip_radius: float, frame: ProfileFrame, x: FloatArray, z: FloatArray, slope: FloatArray) -> Surface:
