@@ -148,13 +148,17 @@ def window_of_all(crest: FloatArray, normals: FloatArray, sizes: Sequence[Sizes]
     reach = max(window_reach(each, around.trace.tip_radius) for each in sizes)
     samples = gather(around.trace, around.base, crest, normals, reach)
     narrowest = min(each.half_width for each in sizes)
-    width = narrowest / WINDOW_BINS_PER_HALF_WIDTH
-    precise = around.noise.sd <= PRECISE * max(each.height for each in sizes)
+    width, noise = narrowest / WINDOW_BINS_PER_HALF_WIDTH, around.noise.sd
+    highest = max(each.height for each in sizes)
+    precise = noise <= PRECISE * highest
+    # a bin across a kink, where slopes differ by 2 h / x_c, lies off it by an eighth of its width times that: as much
+    # as noise of PRECISE hides of bins of x_c / 30
+    width *= min(max(noise / highest, MODEL_FLOOR) / PRECISE, 1.0)
     most, smooth_over = (2 * MOST_BINS, 0.0) if precise else (MOST_BINS, narrowest)
-    window = bin_samples(samples, width, around.noise.sd, smooth_over, around.noise.levels)
+    window = bin_samples(samples, width, noise, smooth_over, around.noise.levels)
     if len(window) > most:
         coarser = min(width * len(window) / most, narrowest / 8.0)
-        window = bin_samples(samples, coarser, around.noise.sd, smooth_over, around.noise.levels)
+        window = bin_samples(samples, coarser, noise, smooth_over, around.noise.levels)
     return window
 
 
