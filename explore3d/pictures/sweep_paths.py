@@ -23,6 +23,9 @@ SIZE_SAMPLES = 50_000
 LENGTH_BLOCKS = 64
 # A sweep's way up onto a feature is that of a ball of this share of its height
 WAY_SHARE = 1e-3
+# Share of a feature's size below which its height lifts nothing that is seen: a ball of WAY_SHARE of it would be a
+# thousand times as large as digits tell on a body of that size (1e-13)
+LEAST_LIFT = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +79,8 @@ def over_features(paths: Sequence[SweepPath], features: Sequence[Feature]) -> li
             continue
         body = feature_mesh(feature)
         low, high = body.bounds
+        if height < LEAST_LIFT * float(np.max(high - low)):
+            continue
         near = np.flatnonzero(((points >= low - height) & (points <= high + height)).all(axis=1))
         if len(near):
             size = WAY_SHARE * height

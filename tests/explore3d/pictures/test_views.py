@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -130,6 +131,8 @@ def test_a_sweep_is_drawn_over_the_bump_that_it_climbed_not_under_it() -> None:
     np.testing.assert_allclose(lifted.points[:, 2], ellipse, atol=0.05)
     np.testing.assert_array_equal(lifted.points[:, :2], path.points[:, :2])
     np.testing.assert_array_equal(over_features([path], [])[0].points, path.points)
+    low = replace(bump, height=Interval(1e-20, 1e-20, 1e-20))  # no ball is as small as that
+    np.testing.assert_array_equal(over_features([path], [low])[0].points, path.points)
 
 
 def test_a_flat_side_is_shaded_evenly_beside_a_narrow_one_round_a_sharp_edge() -> None:
