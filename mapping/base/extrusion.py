@@ -91,14 +91,15 @@ class _Section:
         inside = self.low < begin[0] and end[-1] < self.high
         return bool(inside and (np.abs(self.sines) < STEEPEST_SINE).all())
 
-    def steps(self, noise: float) -> bool:
+    def steps(self, noise: float, cell: float) -> bool:
         """True of two lines that are one another's parallels, as far as heights of a noise (m) tell, with a climb
-        between them like what a ball makes of a wall: no wider than its radius, and nowhere rounder than it follows."""
+        between them like what a ball makes of a wall: no wider than its radius and a cell (m), whose mean is on its way
+        up as soon as its last sample is, and nowhere rounder than it follows."""
         places, sines, round_ones = self.places, self.sines, np.cumsum(np.append(0, self.rounding > 0.0))
         first, last = np.triu_indices(len(places), 1)
         turned = np.abs(sines[last + 1] - sines[first]) * (self.high - self.low)
         sharp = round_ones[last + 1] == round_ones[first]
-        like_a_wall = sharp & (places[last] - places[first] < self.tip_radius)
+        like_a_wall = sharp & (places[last] - places[first] < self.tip_radius + cell)
         return bool((like_a_wall & (turned < FEATURE_RESIDUAL_SDS * noise)).any())
 
     def outline(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -153,7 +154,9 @@ def extrusion(cloud: Cloud) -> Fitted | None:
         return None
     theta = _sharpened(_settled(best, cloud.points, cloud), cloud)
     section, frame, along = _laid(theta, cloud.points, cloud.tip_radius)
-    if not section.possible or section.steps(cloud.floor):
+    onward = np.diff(cloud.sweep) == 0
+    cell = float(np.median(np.linalg.norm(np.diff(cloud.points, axis=0)[onward], axis=1))) if onward.any() else 0.0
+    if not section.possible or section.steps(cloud.floor, cell):
         return None
     return Fitted(
         "extrusion",

@@ -119,3 +119,14 @@ def test_a_step_is_a_detail_upon_a_plane_and_no_bent_body(height: float, turn: f
     base = fit_base(felt((p, step_height(p, height, TIP)), turn))
     assert base.kind == "plane"
     assert np.ptp(base.levels) == pytest.approx(height, rel=1e-2)
+
+
+def test_stairs_felt_in_cells_as_long_as_their_arcs_are_no_bent_body() -> None:
+    """A cell's mean is on its way up as soon as one of its samples is: climbs are wider by a cell than the ball's."""
+    x, tip, rng = 60e-6 * np.arange(667), 0.5e-3, np.random.default_rng(9)
+    felt_once = step_height(x - 12e-3, 0.3e-3, tip) + step_height(x - 25e-3, 0.2e-3, tip)
+    rows = [np.column_stack([x, np.full(len(x), 1e-3 * k), felt_once]) for k in range(16)]
+    centers = np.concatenate(rows) + tip * np.array([0.0, 0.0, 1.0])
+    centers[:, 2] += 1e-6 * rng.standard_normal(len(centers))
+    base = fit_base(Trace(np.arange(len(centers)) * 1.0, centers, np.repeat(np.arange(16), len(x)), tip))
+    assert base.kind == "plane" and np.sort(np.abs(base.levels)) == pytest.approx([0.0, 0.2e-3, 0.5e-3], abs=2e-6)
