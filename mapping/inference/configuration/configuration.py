@@ -29,7 +29,7 @@ from mapping.inference.families import (
     twin_beside,
 )
 from mapping.inference.joint import JoinedShape, stands_out
-from mapping.inference.kinds import LineKind, PointKind, kind_of, sizes_of
+from mapping.inference.kinds import UPRIGHT_RUN, LineKind, PointKind, kind_of, sizes_of
 from mapping.inference.likelihood import LogPosterior, Shape
 from mapping.inference.sampler import Laplace, find_optima, laplace
 
@@ -292,18 +292,23 @@ def on_its_floor(part: Part, place: Neighbourhood) -> Part:
     return wide if log[1] > log[0] else part
 
 
-def as_bar(part: Part, place: Neighbourhood, top: float) -> Part:
-    """A ridge with a flat top of a width (m) and upright flanks."""
+def as_bar(part: Part, place: Neighbourhood, top: float, run: float | None = None) -> Part:
+    """A ridge with a flat top of a width (m) and flanks that climb over a run (m), or upright ones."""
     ridge: Any = part.shape
     bar = trapezoid_beside(ridge, sizes_of(part.feature, ridge.tip_radius), roof=False)
-    return Part(part.feature, bar, np.concatenate([part.start[:-1], np.log([top, 0.02 * place.half_width])]))
+    return Part(part.feature, bar, np.concatenate([part.start[:-1], np.log([top, run or _upright(place)])]))
 
 
-def as_frustum(part: Part, place: Neighbourhood, top: float) -> Part:
-    """A round bump with a flat top of a width (m) and upright flanks."""
+def as_frustum(part: Part, place: Neighbourhood, top: float, run: float | None = None) -> Part:
+    """A round bump with a flat top of a width (m) and a flank that climbs over a run (m), or an upright one."""
     cap: Any = part.shape
     frustum = frustum_beside(cap, sizes_of(part.feature, cap.tip_radius), roof=False)
-    return Part(part.feature, frustum, np.append(part.start[:-1], np.log([top, 0.02 * place.half_width])))
+    return Part(part.feature, frustum, np.append(part.start[:-1], np.log([top, run or _upright(place)])))
+
+
+def _upright(place: Neighbourhood) -> float:
+    """Run of a flank that is never touched, m."""
+    return UPRIGHT_RUN * place.half_width
 
 
 def as_bell(part: Part, half: float) -> Part:

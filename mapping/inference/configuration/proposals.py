@@ -43,8 +43,9 @@ from mapping.inference.families import (
 from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 
 Parts = list[Part]
-# Tops of a bar and gaps of a twin, in half-widths of the disturbance, that their optima are searched from
-TOPS, GAPS = (0.5,), (0.2, 0.7)
+# Tops and runs of the flanks of what has a flat top (None: upright), in half-widths of the disturbance, that its
+# optimum is searched from: no descent leads from flanks that are never touched to such as are. Gaps of a twin likewise
+FLATS, GAPS = ((0.5, None), (0.1, 0.6)), (0.2, 0.7)
 # Half widths of what runs out, in those of the disturbance, that its optimum is searched from
 SKIRTS = (0.3, 0.8)
 # Points so near to a straight line, in half-widths, may be of it
@@ -83,15 +84,16 @@ def sections(now: Configuration) -> Iterator[Parts]:
             half = sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
             for share in SKIRTS:
                 yield [*now.parts[:k], as_bell(part, share * half), *now.parts[k + 1 :]]
-            for share in TOPS:
-                yield [*now.parts[:k], as_frustum(part, now.place, share * half), *now.parts[k + 1 :]]
+            for top, run in FLATS:
+                flat = as_frustum(part, now.place, top * half, run and run * half)
+                yield [*now.parts[:k], flat, *now.parts[k + 1 :]]
         if type(part.shape) is GrooveShape and not _has_crests_at_rims(part, now):
             yield [*now.parts[:k], as_smooth(now.parts, k, now.place), *now.parts[k + 1 :]]
         ridge = _ridge_of(part, now.place)
         if ridge is None or now.as_narrow_as_wires[k]:
             continue
         half = sizes_of(ridge.feature, now.place.around.trace.tip_radius).half_width
-        others = [as_bar(ridge, now.place, share * half) for share in TOPS]
+        others = [as_bar(ridge, now.place, top * half, run and run * half) for top, run in FLATS]
         others += [as_bell(ridge, share * half) for share in SKIRTS]
         others += [as_twin(ridge, now.place, share * half, lying=wires) for share in GAPS for wires in (False, True)]
         if not isinstance(part.shape, RidgeShape):

@@ -6,6 +6,7 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from mapping.inference.kinds.bump import bump_shape as bump_shape
+    from mapping.inference.kinds.crests import UPRIGHT_RUN as UPRIGHT_RUN
     from mapping.inference.kinds.kind import (
         KINDS as KINDS,
         RIBBON_LIFT as RIBBON_LIFT,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "bump": ("bump_shape",),
+    "crests": ("UPRIGHT_RUN",),
     "kind": (
         "KINDS",
         "RIBBON_LIFT",

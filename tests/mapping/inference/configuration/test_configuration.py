@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.ndimage import grey_dilation
 
 from explore3d.analysis import TrueFeature
 from explore3d.bench.detection import NOISE_SOURCES
@@ -19,7 +20,7 @@ from explore3d.bench.posterior.counts import run_counts
 from explore3d.bench.scenes import FIRST_BUILT_WITH, classified_body
 from mapping import Details, Feature, Interval, Support, Surface, Trace
 from mapping.assembly import assemble
-from mapping.base import Base, LaidTrace
+from mapping.base import Base, LaidTrace, fit_base
 from mapping.detection import detect
 from mapping.inference.configuration import Places, in_words, numbers_in, share_as_told
 from mapping.inference.configuration.account import (
@@ -532,3 +533,20 @@ def _cosine_groove(noise: float, seed: int) -> tuple[Trace, Base]:
     z += noise * np.random.default_rng(seed).standard_normal(len(z))
     trace = Trace(1e-3 * np.arange(len(z)), np.column_stack([np.tile(x, sweeps), y, z]), sweep, tip)
     return trace, Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
+
+
+def test_a_roof_whose_gentle_flanks_are_touched_is_one_ridge() -> None:
+    """From upright flanks, which are not touched, no descent leads to gentle ones: a second ridge stood for them."""
+    tip, fine, rng = 0.5e-3, 2e-6, np.random.default_rng(0)
+    grid, x = fine * np.arange(7500), 60e-6 * np.arange(250)
+    roof = 0.2e-3 * np.clip(1.0 - np.abs(grid - 7.5e-3) / 0.5e-3, 0.0, None)
+    reach = int(tip / fine) - 1
+    ball = np.sqrt(tip**2 - (fine * np.arange(-reach, reach + 1)) ** 2)
+    height = np.interp(x, grid, grey_dilation(roof, structure=ball, mode="nearest"))
+    rows = [np.column_stack([x, np.full(len(x), 1e-3 * k), height]) for k in range(16)]
+    centers = np.concatenate(rows) + 1e-7 * rng.standard_normal((16 * len(x), 1)) * np.array([0.0, 0.0, 1.0])
+    trace = Trace(np.arange(len(centers)) * 1.0, centers, np.repeat(np.arange(16), len(x)), tip)
+    base = fit_base(trace)
+    laid_trace = LaidTrace.of(trace, base)
+    (ridge,) = assemble(detect(laid_trace, base), laid_trace, base)
+    assert ridge.kind == "ridge"
