@@ -101,6 +101,7 @@ def test_of_thirty_changes_among_a_hundred_features_nine_tenths_are_found_and_ha
     assert not compare_models(first, first).likely(0.5)
 
 
+@pytest.mark.slow
 def test_scans_that_share_no_place_have_nothing_in_common(tmp_path: Path) -> None:
     nothing = np.zeros(0)
     log = scan(nothing, nothing, np.random.default_rng(0), count=3)

@@ -216,6 +216,7 @@ def test_a_dent_a_quarter_as_long_as_the_rows_is_one_pit() -> None:
     assert found.height.low < -0.15e-3 < found.height.high
 
 
+@pytest.mark.slow
 def test_a_bead_as_wide_as_the_ball_that_rises_and_falls_is_one_line() -> None:
     """Felt 1.42 to 1.58 times as wide as a crest: single sweeps of it are less wide than a detail is alone."""
     aside = np.linspace(-1e-3, 1e-3, 401)[:, None]

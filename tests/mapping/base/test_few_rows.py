@@ -99,6 +99,7 @@ def table(path: Path, trace: Trace) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_an_arc_with_a_slot_is_no_plane_that_half_of_it_lies_off() -> None:
     base = fit_base(rows_over(slot() - X**2 / (2.0 * 0.3), 16, 40e-6))
     bare = np.column_stack([np.linspace(1e-3, 9e-3, 17), np.full(17, 300e-6), np.zeros(17)])

@@ -101,6 +101,7 @@ def test_the_same_trace_gives_the_same_star_body() -> None:
     np.testing.assert_array_equal(once.vertices, again.vertices)
 
 
+@pytest.mark.slow
 def test_a_block_has_its_six_faces_and_explains_the_way_round_its_edges() -> None:
     lines = around_block()
     base = fit_base(swept(lines))

@@ -62,6 +62,7 @@ def test_a_curved_body_keeps_its_curvature_beside_a_step() -> None:
     assert levels(base) == pytest.approx([0.0, 0.2e-3], abs=0.4 * NOISE)
 
 
+@pytest.mark.slow
 def test_a_disc_with_a_rim_is_a_plane_on_two_levels() -> None:
     """A quarter of the path lies on the rim and on flanks: even from cell to cell, it made the noise seem so, too, and
     an extrusion, which explained less, took less to pay for."""

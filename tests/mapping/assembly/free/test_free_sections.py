@@ -94,6 +94,7 @@ def test_a_wide_detail_may_be_a_large_part_of_its_profile(wide: float) -> None:
     assert found.height.low - 10e-6 < -1e-3 < found.height.high + 10e-6
 
 
+@pytest.mark.slow
 def test_an_edge_is_no_part_of_a_groove_on_its_terrace() -> None:
     """However far the terrace reaches that it was compared with."""
     tip, fine = 1e-3, 5e-6
@@ -149,6 +150,7 @@ def test_a_step_through_which_the_base_was_drawn_stays_a_step() -> None:
     assert [feature.kind for feature in found] == ["step"] and not found[0].details.free_section
 
 
+@pytest.mark.slow
 def test_of_a_rack_the_teeth_are_as_high_and_as_wide_as_they_are() -> None:
     """Its roots, two fifths of it, are the base: what they scatter by is not the others' height."""
 

@@ -37,6 +37,7 @@ def test_a_step_of_a_rough_profile_is_one_step_with_its_height(height: float, se
     assert step.kind == "step" and abs(step.height.median) == pytest.approx(height, abs=0.06e-6)
 
 
+@pytest.mark.slow
 def test_stairs_have_as_many_levels() -> None:
     stairs = sum(step_height(X - place, 3e-6, TIP) for place in (2e-3, 4e-3, 6e-3))
     base = fit_base(Trace.from_profile(X, rough(2) + stairs + TIP, TIP))

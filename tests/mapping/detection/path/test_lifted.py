@@ -52,7 +52,8 @@ def laid(trace: Trace) -> LaidTrace:
 
 
 @pytest.mark.parametrize(
-    ("lift", "step"), [(3e-3, 0.2e-3), (20e-3, 0.2e-3), pytest.param(20e-3, 0.03e-3, marks=pytest.mark.slow)]
+    ("lift", "step"),
+    [(3e-3, 0.2e-3), *(pytest.param(20e-3, step, marks=pytest.mark.slow) for step in (0.2e-3, 0.03e-3))],
 )
 def test_paths_through_the_air_are_told_from_rows(lift: float, step: float) -> None:
     trace, felt = recorded([row(y, k % 2 == 0) for k, y in enumerate(ROWS)], lift, step)
@@ -111,6 +112,7 @@ def test_an_inner_corner_that_is_climbed_and_left_is_felt() -> None:
     assert lifted(on) is None
 
 
+@pytest.mark.slow
 def test_lifts_say_from_which_side_a_plate_was_felt() -> None:
     trace, felt = recorded([row(y, k % 2 == 0) for k, y in enumerate(ROWS)], 20e-3)
     below = Trace(trace.t, trace.centers * [1.0, 1.0, -1.0], trace.sweep, TIP)
@@ -120,6 +122,7 @@ def test_lifts_say_from_which_side_a_plate_was_felt() -> None:
     assert (felt & ~found.felt).sum() <= 5 * 2 * len(ROWS)
 
 
+@pytest.mark.slow
 def test_an_exact_path_that_rises_to_its_end_is_searched_to_its_end() -> None:
     """Without noise its lowest place within a radius is as low as itself, and was gone to for ever."""
     x = 1e-5 * np.arange(500)

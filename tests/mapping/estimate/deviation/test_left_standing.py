@@ -74,6 +74,7 @@ def test_the_command_finds_it_on_a_raster_as_on_a_profile(
     assert "stands off the base" not in text  # what is a feature is not said once more
 
 
+@pytest.mark.slow
 def test_a_hollow_is_not_as_deep_as_its_noisiest_place() -> None:
     """Its deepest place, of eleven sweeps, came out a quarter too deep where noise is a twelfth of the depth."""
 
