@@ -584,10 +584,12 @@ class Proposal:
 
 ONE_COURSE = Proposal("one course", lambda now, points: chained(now))
 JOIN = Proposal("join", lambda now, points: joined(now))
+SMOOTHER = Proposal("smoother", lambda now, points: smoother(now))
 REMOVE = Proposal("remove", lambda now, points: without(now))
 PROPOSALS = (
+    REMOVE,
+    SMOOTHER,
     Proposal("section", lambda now, points: sections(now)),
-    Proposal("smoother", lambda now, points: smoother(now)),
     Proposal("straight lines", straight),
     Proposal("ring", ringed),
     ONE_COURSE,
@@ -598,7 +600,6 @@ PROPOSALS = (
     Proposal("kind", lambda now, points: other_kinds(now)),
     Proposal("extend", lambda now, points: extended(now)),
     Proposal("add", lambda now, points: more(now)),
-    REMOVE,
 )
 
 

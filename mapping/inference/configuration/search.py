@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ import numpy as np
 from mapping import FloatArray, MappingError
 from mapping.inference.configuration.configuration import Configuration, Part, fitted, laid
 from mapping.inference.configuration.neighbourhood import Neighbourhood
-from mapping.inference.configuration.proposals import JOIN, ONE_COURSE, PROPOSALS, REMOVE, Parts, Proposal
+from mapping.inference.configuration.proposals import JOIN, ONE_COURSE, PROPOSALS, REMOVE, SMOOTHER, Parts, Proposal
 
 # Details that are weighed at once, each of so many parameters, and places that so many are weighed on (see `account`):
 # one fit of them takes one to two CPU seconds. Its time grows with the places, and with the parameters, each of which
@@ -30,6 +31,8 @@ FITS_OF_DETAIL = 16
 MOST_WORK = 6.0
 # Share of its cost that a fit takes which is given up as hopeless: 0.05 of 0.3 CPU s in the median of 48 about a groove
 GIVEN_UP_SHARE = 0.2
+# What costs least, and what the others would be asked twice without: a section is asked on the course that is likeliest
+FIRST = (REMOVE, SMOOTHER)
 # A proposal must be better by this log odds: less is rounding, or the same configuration found again
 WORTH = 0.5
 # What is less likely than the best by this log odds is not gone on from, nor told
@@ -42,8 +45,8 @@ class Account:
 
     Args:
         start: what the rules say.
-        best: the configuration of the highest odds.
-        visited: the best of each set of kinds, the best of all first.
+        best: the last configuration that was accepted: none that was visited is better by more than rounding.
+        visited: the best of each set of kinds, the most probable first.
         accepted: names of the proposals that led from the beginning to the best.
         bounded: True if the search ended at MOST_FITTED or MOST_WORK, with proposals left.
     """
@@ -71,9 +74,9 @@ def searched(
         start: what the rules say, fitted.
         parts: the same, as the rules left it.
         points: (M, 3) of crests in the neighbourhood, m.
-        proposals: the generators that are asked, in order.
+        proposals: the generators that are asked in turn, those of FIRST again after each improvement.
     """
-    place, best, accepted, idle = start.place, start, list[str](), 0
+    place, best, accepted = start.place, start, list[str]()
     spent, bounded = _Spent(len(parts)), False
     spent.on(parts, place)
     visited = {start.kinds: start}
@@ -97,40 +100,41 @@ def searched(
                 if spent.all_work:
                     bounded = True
                     break
-                other = fitted(other_parts, place)
-                spent.on(other_parts, place)
+                other = fitted(other_parts, place, best, anew=True)
+                spent.on(other_parts, place, GIVEN_UP_SHARE if other is None else 1.0)
                 if other is not None and other.log_odds > best.log_odds + WORTH:
                     best, joined, joining, joiner = other, laid(other_parts, place), True, proposal
         if joining:
             whole = joined
             visited[best.kinds] = best
             accepted.append(joiner.name)
-    while idle < len(proposals):
-        for proposal in proposals:
-            found = best
-            for proposed in _yielded(proposal, best, points):
-                # what does not pay for itself goes, however many there are
-                if spent.enough if proposal is not REMOVE else spent.too_much:
-                    bounded = True
-                    break
-                other = fitted(proposed, best.place, best)
-                spent.on(proposed, best.place, GIVEN_UP_SHARE if other is None else 1.0)
-                if other is None:
-                    continue
-                known = visited.get(other.kinds)
-                if known is None or other.log_odds > known.log_odds:
-                    visited[other.kinds] = other
-                if other.log_odds > found.log_odds + WORTH:
-                    found = other
-            idle = 0 if found is not best else idle + 1
-            if found is not best:
-                best = found
-                accepted.append(proposal.name)
-            if idle == len(proposals):
+    first = [each for each in proposals if each in FIRST]
+    others = [each for each in proposals if each not in FIRST]
+    waiting, idle, turn = list(first), 0, itertools.cycle(others)
+    while waiting or idle < len(others):
+        if not waiting:
+            idle += 1
+        proposal, found = waiting.pop(0) if waiting else next(turn), best
+        for proposed in _yielded(proposal, best, points):
+            # what does not pay for itself goes, however many there are
+            if spent.enough if proposal is not REMOVE else spent.too_much:
+                bounded = True
                 break
+            other = fitted(proposed, best.place, best)
+            spent.on(proposed, best.place, GIVEN_UP_SHARE if other is None else 1.0)
+            if other is None:
+                continue
+            known = visited.get(other.kinds)
+            if known is None or other.log_odds > known.log_odds:
+                visited[other.kinds] = other
+            if other.log_odds > found.log_odds + WORTH:
+                found = other
+        if found is not best:
+            best, waiting, idle = found, list(first), 0
+            accepted.append(proposal.name)
     order = sorted(visited.values(), key=lambda each: -each.log_odds)
     likely = [each for each in order if each.log_odds > order[0].log_odds - NEGLIGIBLE_ODDS]
-    return Account(start, order[0], tuple(likely), tuple(accepted), bounded)
+    return Account(start, best, tuple(likely), tuple(accepted), bounded)
 
 
 @dataclass(eq=False)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
-from mapping.geometry.mesh import nearest_on
+from mapping.geometry.mesh import distances, nearest_on
 from mapping.geometry.proxy import Bar, Chain, Part
-from mapping.geometry.templates import chain_height, contact_half_width, radius_of_cap, width_of_cap
+from mapping.geometry.templates import contact_half_width, radius_of_cap, width_of_cap
 from mapping.inference.families import (
     BumpShape,
     RidgeShape,
@@ -57,9 +56,9 @@ class Crest(Kind):
         reach, axis = CREST_TRACE_REACH * contact_half_width(height, radius, tip_radius), feature.axis
         # most features lie far away, which the box about them tells
         near = ((feet > axis.min(axis=0) - reach) & (feet < axis.max(axis=0) + reach)).all(axis=1)
-        near[near] = axis_distance(feet[near], axis) < reach
+        near[near] = distances(feet[near], axis) < reach
         crest, over = feature.axis + (height - radius) * feature.normals, np.zeros(len(feet))
-        over[near] = np.minimum(chain_height(feet[near], normals[near], crest, radius, tip_radius), height)
+        over[near] = np.minimum(_chain(feet[near], normals[near], crest, radius, tip_radius), height)
         return over
 
     def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
@@ -151,13 +150,24 @@ def crest_radius(feature: Feature) -> float:
     return float(radius_of_cap(feature.height.median, width) if known is None else known)
 
 
+def _chain(feet: FloatArray, normals: FloatArray, chain: FloatArray, radius: float, tip_radius: float) -> FloatArray:
+    """(N,) heights at which a ball leaves a chain (K, 3) of capsules, m; as `chain_height`."""
+    from mapping.geometry.templates import chain_heights
+
+    count, out = len(feet), np.empty((1, len(feet)))
+    first, last = np.zeros(count, dtype=np.int64), np.full(count, len(chain) - 1, dtype=np.int64)
+    place = (feet, normals, np.zeros_like(feet), np.zeros(count), first, last)
+    chain_heights(*place, np.ascontiguousarray(chain)[None], np.array([radius]), np.ones(1), tip_radius, out)
+    return np.asarray(out[0])
+
+
 def _flat_topped(feature: Feature, feet: FloatArray, tip_radius: float) -> FloatArray:
     """(N,) heights of a line or a spot with a flat top and straight flanks, m."""
     from mapping.geometry.templates import section_heights
 
     rounding, ends = feature.details.end_rounding, np.array([[-1e300, 1e300]])
     if rounding is None or feature.closed or len(feature.axis) < 2:
-        away, rounding = axis_distance(feet, feature.axis)[:, None], 0.0
+        away, rounding = distances(feet, feature.axis)[:, None], 0.0
         along = np.zeros_like(away)
     else:
         along, away = (each[:, None] for each in along_and_aside(feet, feature.axis))
@@ -174,7 +184,7 @@ def _bell(feature: Feature, feet: FloatArray, tip_radius: float) -> FloatArray:
     """(N,) heights that a section of the feature's scale and exponent leaves, m; an end is half of a bump."""
     from mapping.geometry.templates import smooth_point_heights
 
-    details, away = feature.details, axis_distance(feet, feature.axis)[:, None]
+    details, away = feature.details, distances(feet, feature.axis)[:, None]
     scale, exponent = float(details.scale or 0.0), float(details.exponent or 0.0)
     known = feature.height.median, 0.5 * float(width_at_half_height(scale, exponent)), 1.0 / exponent
     section, out = [np.array([each]) for each in known], np.empty((1, len(feet)))
@@ -192,14 +202,3 @@ def along_and_aside(points: FloatArray, axis: FloatArray) -> tuple[FloatArray, F
     ])  # fmt: skip
     on, along = nearest_on(points, longer)
     return along - far, np.linalg.norm(points - on, axis=1)
-
-
-def axis_distance(points: FloatArray, axis: FloatArray) -> FloatArray:
-    """(N,) distances of points from a polyline (K, 3), m."""
-    best = np.linalg.norm(points - axis[0], axis=1)
-    for start, end in itertools.pairwise(axis):
-        leg = end - start
-        square = max(float(leg @ leg), np.finfo(float).tiny)
-        share = np.clip((points - start) @ leg / square, 0.0, 1.0)
-        best = np.minimum(best, np.linalg.norm(points - start - share[:, None] * leg, axis=1))
-    return np.asarray(best)

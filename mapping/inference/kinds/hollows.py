@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
+from mapping.geometry.mesh import distances
 from mapping.geometry.proxy import Part, Trench
 from mapping.geometry.templates import rim_height
 from mapping.inference.families import Sizes, SmoothGrooveShape, SmoothPitShape, smooth_section
-from mapping.inference.kinds.crests import along_and_aside, axis_distance, rounding_said
+from mapping.inference.kinds.crests import along_and_aside, rounding_said
 from mapping.inference.kinds.kind import Kind, Section, place_sd, preliminary
 from mapping.inference.likelihood import Shape
 
@@ -36,7 +37,7 @@ class Hollow(Kind):
         if height >= 0.0:
             return np.zeros(len(feet))
         if feature.details.taper is not None:
-            return _smooth(feature, axis_distance(feet, feature.axis), tip_radius)
+            return _smooth(feature, distances(feet, feature.axis), tip_radius)
         return rim_height(_inside(feet, feature), tip_radius, -height)
 
     def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
@@ -58,7 +59,7 @@ def _inside(feet: FloatArray, feature: Feature) -> FloatArray:
     """(N,) distances from the rim of a mouth, positive within it, m."""
     half, rounding = 0.5 * max(feature.width.median, 1e-12), feature.details.end_rounding
     if rounding is None or len(feature.axis) < 2 or feature.closed:
-        return np.asarray(half - axis_distance(feet, feature.axis))
+        return np.asarray(half - distances(feet, feature.axis))
     along, aside = along_and_aside(feet, feature.axis)
     return within_ends(np.minimum(along, feature.length.median - along), half - aside, rounding * half)
 

@@ -94,13 +94,6 @@ class LogPosterior:
         prior = np.column_stack([p.residual(theta[:, i]) for i, p in enumerate(self.shape.priors)])
         return np.concatenate([data, prior], axis=1)
 
-    def chi_square(self, log_density: float) -> float:
-        """The squared length of the residuals that goes with a log density: what both leave out is one constant."""
-        some = np.where(np.isfinite(self.low), self.low, np.where(np.isfinite(self.high), self.high, 0.0))
-        each = zip(self.shape.priors, some, strict=True)
-        constant = sum(float(p.log_density(x) + 0.5 * p.residual(x) ** 2) for p, x in each)
-        return 2.0 * (constant - log_density)
-
     def _data_residuals(self, theta: FloatArray) -> FloatArray:
         return self.likelihood.residuals(self.templates(theta))
 

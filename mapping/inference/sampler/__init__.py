@@ -17,6 +17,8 @@ if TYPE_CHECKING:
         importance_sample as importance_sample,
     )
     from mapping.inference.sampler.laplace import (
+        ITERATIONS as ITERATIONS,
+        LEARNING as LEARNING,
         Laplace as Laplace,
         find_optima as find_optima,
         laplace as laplace,
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "ensemble": ("Chain", "sample_ensemble", "steps_for", "walkers_for"),
     "importance": ("Importance", "TRUSTED_K_HAT", "importance_sample"),
-    "laplace": ("Laplace", "find_optima", "laplace", "linearised"),
+    "laplace": ("ITERATIONS", "LEARNING", "Laplace", "find_optima", "laplace", "linearised"),
     "proposal": ("root_of",),
     "psis": ("resample",),
 }

@@ -54,7 +54,11 @@ class Laplace:
 
 
 def find_optima(
-    target: LogPosterior, starts: FloatArray, iterations: int = ITERATIONS, most: float = np.inf
+    target: LogPosterior,
+    starts: FloatArray,
+    iterations: int = ITERATIONS,
+    most: float = np.inf,
+    learning: int = LEARNING,
 ) -> list[FloatArray]:
     """Distinct optima (P,) reached by Levenberg-Marquardt from the starts (M, P), best first.
 
@@ -69,6 +73,7 @@ def find_optima(
         iterations: that a search may take.
         most: chi-square (of data and priors) above which no optimum is of use: where no search promises less, all
             are given up, and there is none.
+        learning: iterations that a search may take before it is given up.
     """
     ends = _known(target).optima
     reached: list[tuple[FloatArray, float]] = []
@@ -77,7 +82,7 @@ def find_optima(
         if start.tobytes() in ends:
             reached.append((start, np.inf))
             continue
-        search = _descend(target, start, iterations, reached, np.inf if reached else most)
+        search = _descend(target, start, iterations, reached, np.inf if reached else most, learning)
         if search is None:
             gave_up = True
         elif gave_up:  # it is of use after all: no start is given up
@@ -154,11 +159,16 @@ def linearised(target: LogPosterior, theta: FloatArray) -> tuple[FloatArray, Flo
 
 
 def _descend(
-    target: LogPosterior, start: FloatArray, iterations: int, earlier: Sequence[tuple[FloatArray, float]], most: float
+    target: LogPosterior,
+    start: FloatArray,
+    iterations: int,
+    earlier: Sequence[tuple[FloatArray, float]],
+    most: float,
+    learning: int,
 ) -> tuple[FloatArray, float] | None:
     """Where a search from a start (P,) ends, and chi-square there; those of an earlier one if it comes as near.
 
-    None if it is given up, for it promises no chi-square of `most` or less.
+    None if it is given up, for it promises no chi-square of `most` or less after `learning` iterations.
     """
     low, high, scale = target.low, target.high, target.shape.step
     theta = np.clip(start, low, high)
@@ -175,7 +185,7 @@ def _descend(
         # take, and leaves them to crawl (projected Newton: Bertsekas, SIAM J. Control Optim. 20, 1982)
         scaled = scaled * ~(((theta <= low) & (outwards > 0.0)) | ((theta >= high) & (outwards < 0.0)))
         gradient, hessian = scaled.T @ residual, scaled.T @ scaled
-        if turn >= LEARNING and cost > most:
+        if turn >= learning and cost > most:
             promised = float(gradient @ shortest_solution(hessian + prior, gradient))
             if cost - PROMISES * promised > most:
                 return None

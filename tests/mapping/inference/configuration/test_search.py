@@ -1,0 +1,67 @@
+"""The search asks what costs least first, and gives up what no optimum can make useful."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mapping.inference.configuration import search
+from mapping.inference.configuration.configuration import HOPELESS, Configuration
+from mapping.inference.configuration.proposals import Proposal
+from mapping.inference.sampler import Laplace
+
+PLACE: Any = SimpleNamespace(levels=[None], window=range(10), held=())
+DETAIL: Any = SimpleNamespace(start=np.zeros(1))
+
+
+def found(parts: list[Any], gain: float) -> Any:
+    """A configuration that each detail makes likelier by so much."""
+    return SimpleNamespace(parts=parts, place=PLACE, kinds=("ridge",) * len(parts), log_odds=gain * len(parts))
+
+
+def more(now: Any, points: Any) -> Iterator[list[Any]]:
+    """Up to two details."""
+    if len(now.parts) < 2:
+        yield [*now.parts, DETAIL]
+
+
+def searched(monkeypatch: pytest.MonkeyPatch, gain: float) -> tuple[search.Account, list[str]]:
+    """What a search finds by a cheap proposal, one more detail, and another, and what was asked in turn."""
+    asked = []
+
+    def noted(name: str, of: Any) -> Proposal:
+        def generator(now: Any, points: Any) -> Iterator[list[Any]]:
+            asked.append(name)
+            yield from of(now, points)
+
+        return Proposal(name, generator)
+
+    monkeypatch.setattr(search, "fitted", lambda parts, place, rival=None, anew=False: found(parts, gain))
+    cheap, other = (noted(name, lambda now, points: iter(())) for name in ("cheap", "other"))
+    proposals = [cheap, noted("more", more), other]
+    monkeypatch.setattr(search, "FIRST", (cheap,))
+    return search.searched(found([], gain), [], np.zeros((0, 3)), proposals), asked
+
+
+def test_what_costs_least_is_asked_again_after_each_improvement(monkeypatch: pytest.MonkeyPatch) -> None:
+    account, asked = searched(monkeypatch, 2.0)
+    assert asked == ["cheap", "more", "cheap", "other", "more", "cheap", "other", "more"]
+    assert account.accepted == ("more", "more") and account.best.log_odds == 4.0 and not account.bounded
+
+
+def test_what_is_better_by_less_than_counts_is_weighed_but_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    account, _ = searched(monkeypatch, 0.3)
+    assert account.best is account.start and len(account.visited) == 2
+
+
+def test_what_has_fewer_parameters_may_be_less_likely_at_its_best() -> None:
+    likelihood: Any = SimpleNamespace(log_density=lambda templates: np.array([900.0]))
+    place: Any = SimpleNamespace(levels=[(likelihood, 0.0)])
+    rival = Configuration((), place, Laplace(np.zeros(20), np.eye(20), 1000.0), 0, 800.0, Any)  # type: ignore[arg-type]
+    rival.__dict__["template"] = np.zeros(3)
+    assert rival.hopeless(20, 0) == rival.hopeless(30, 0) == 900.0 - HOPELESS
+    assert rival.hopeless(5, 0) == pytest.approx(900.0 - 0.75 * 100.0 - HOPELESS)
