@@ -10,7 +10,7 @@ import numpy as np
 from mapping import FloatArray, MappingError
 from mapping.inference.configuration.configuration import Configuration, Part, fitted, laid
 from mapping.inference.configuration.neighbourhood import Neighbourhood
-from mapping.inference.configuration.proposals import JOIN, ONE_COURSE, PROPOSALS, REMOVE, Parts, Proposal
+from mapping.inference.configuration.proposals import JOIN, ONE_COURSE, PROPOSALS, REMOVE, RETELL, Parts, Proposal
 
 # Details that are weighed at once, each of so many parameters, and places that so many are weighed on (see `account`):
 # one fit of them takes one to two CPU seconds. Its time grows with the places, and with the parameters, each of which
@@ -109,8 +109,8 @@ def searched(
         for proposal in proposals:
             found = best
             for proposed in _yielded(proposal, best, points):
-                # what does not pay for itself goes, however many there are
-                if spent.enough if proposal is not REMOVE else spent.too_much:
+                # what does not pay for itself goes, and what is left over is told anew, however many there are
+                if spent.too_much if proposal in (REMOVE, RETELL) else spent.enough:
                     bounded = True
                     break
                 other = fitted(proposed, best.place, best)
@@ -122,10 +122,14 @@ def searched(
                     visited[other.kinds] = other
                 if other.log_odds > found.log_odds + WORTH:
                     found = other
+                    if proposal is RETELL and found.is_explained:  # the other answers seemed less likely
+                        break
             idle = 0 if found is not best else idle + 1
             if found is not best:
                 best = found
                 accepted.append(proposal.name)
+                if proposal is RETELL:  # from there the search begins anew
+                    spent.fits, bounded = 0.0, False
             if idle == len(proposals):
                 break
     order = sorted(visited.values(), key=lambda each: -each.log_odds)
