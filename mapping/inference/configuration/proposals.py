@@ -610,8 +610,8 @@ RETELL = Proposal("retell", lambda now, points: retold(now))
 PROPOSALS = (
     Proposal("section", lambda now, points: sections(now)),
     Proposal("smoother", lambda now, points: smoother(now)),
-    RETELL,
     Proposal("straight lines", straight),
+    RETELL,
     Proposal("ring", ringed),
     ONE_COURSE,
     JOIN,

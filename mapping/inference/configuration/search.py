@@ -115,7 +115,8 @@ def searched(
                     break
                 other = fitted(proposed, best.place, best)
                 spent.on(proposed, best.place, GIVEN_UP_SHARE if other is None else 1.0)
-                if other is None:
+                # crests beside crests hide what has another form: what is told anew leaves nothing, or is none
+                if other is None or (proposal is RETELL and not other.fits):
                     continue
                 known = visited.get(other.kinds)
                 if known is None or other.log_odds > known.log_odds:
