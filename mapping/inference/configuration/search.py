@@ -11,7 +11,16 @@ import numpy as np
 from mapping import FloatArray, MappingError
 from mapping.inference.configuration.configuration import Configuration, Part, fitted, laid
 from mapping.inference.configuration.neighbourhood import Neighbourhood
-from mapping.inference.configuration.proposals import JOIN, ONE_COURSE, PROPOSALS, REMOVE, SMOOTHER, Parts, Proposal
+from mapping.inference.configuration.proposals import (
+    JOIN,
+    ONE_COURSE,
+    PROPOSALS,
+    REMOVE,
+    RETELL,
+    SMOOTHER,
+    Parts,
+    Proposal,
+)
 
 # Details that are weighed at once, each of so many parameters, and places that so many are weighed on (see `account`):
 # one fit of them takes one to two CPU seconds. Its time grows with the places, and with the parameters, each of which
@@ -116,22 +125,27 @@ def searched(
             idle += 1
         proposal, found = waiting.pop(0) if waiting else next(turn), best
         for proposed in _yielded(proposal, best, points):
-            # what does not pay for itself goes, however many there are
-            if spent.enough if proposal is not REMOVE else spent.too_much:
+            # what does not pay for itself goes, and what is left over is told anew, however many there are
+            if spent.too_much if proposal in (REMOVE, RETELL) else spent.enough:
                 bounded = True
                 break
             other = fitted(proposed, best.place, best)
             spent.on(proposed, best.place, GIVEN_UP_SHARE if other is None else 1.0)
-            if other is None:
+            # crests beside crests hide what has another form: what is told anew leaves nothing, or is none
+            if other is None or (proposal is RETELL and not other.fits):
                 continue
             known = visited.get(other.kinds)
             if known is None or other.log_odds > known.log_odds:
                 visited[other.kinds] = other
             if other.log_odds > found.log_odds + WORTH:
                 found = other
+                if proposal is RETELL and found.is_explained:  # the other answers seemed less likely
+                    break
         if found is not best:
             best, waiting, idle = found, list(first), 0
             accepted.append(proposal.name)
+            if proposal is RETELL:  # from there the search begins anew
+                spent.fits, bounded = 0.0, False
     order = sorted(visited.values(), key=lambda each: -each.log_odds)
     likely = [each for each in order if each.log_odds > order[0].log_odds - NEGLIGIBLE_ODDS]
     return Account(start, best, tuple(likely), tuple(accepted), bounded)

@@ -1,0 +1,73 @@
+"""What is told as one detail and leaves something over is told anew as the crests that explain it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from explore3d.bench.posterior.calibration import plate, record, straight_path
+from explore3d.bench.posterior.counts import run_counts
+from explore3d.bench.scenes import FIRST_BUILT_WITH
+from mapping import Feature, FloatArray, Interval, Support
+from mapping.inference.configuration import Places
+from mapping.inference.configuration.configuration import Configuration, fitted, part_of
+from mapping.inference.configuration.neighbourhood import neighbourhood
+from mapping.inference.configuration.proposals import axis_of, retold
+from mapping.inference.configuration.pursuit import pursued
+from mapping.inference.families import Surroundings
+from mapping.inference.kinds import feature_trace
+from mapping.instrument import Noise
+
+TIP, SPACING = 10e-3, 0.4e-3
+
+
+def _crest(axis: list[tuple[float, float]], height: float) -> Feature:
+    """A wire or, of one point, a bump of a height (mm) along an axis (mm)."""
+    points: FloatArray = 1e-3 * np.column_stack([np.array(axis), np.zeros(len(axis))])
+    size, up = Interval(1e-3 * height, 0.8e-3 * height, 1.2e-3 * height), np.tile([0.0, 0.0, 1.0], (len(axis), 1))
+    kind = "ridge" if len(axis) > 1 else "bump"
+    return Feature(kind, points, up, size, size, size, Support(9.0, 9), True, 1e-4)
+
+
+def _told_as(one: Feature, true: list[Feature]) -> Configuration:
+    """One detail, fitted to rows 3 mm apart over true ones."""
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(-12e-3, 12e-3, SPACING), 3e-3 * np.arange(-4, 5)))
+    feet, up = np.column_stack([x, y, 0.0 * x]), np.tile([0.0, 0.0, 1.0], (len(x), 1))
+    heights = np.max([feature_trace(each, feet, up, TIP) for each in true], axis=0)
+    heights += 0.05e-3 * np.random.default_rng(1).standard_normal(len(x))
+    trace = record([straight_path((-12e-3, 0.0), (12e-3, 0.0))], np.zeros(4001))
+    around = Surroundings(trace, plate(), Noise(0.05e-3, 0.0, 1e-3))
+    sweep = np.round(y / 3e-3).astype(np.int64)
+    places = Places(feet, up, heights, np.ones(len(x), dtype=np.int64), sweep, SPACING)
+    place = neighbourhood([one, *true], [], places, around, 0.01)
+    assert place is not None
+    told = fitted([part_of(one, place)], place)
+    assert told is not None
+    return told
+
+
+def test_two_wires_that_cross_and_were_told_as_one_are_told_anew_as_both() -> None:
+    true = [_crest([(-8.0, -7.5), (8.0, 4.0)], 0.4), _crest([(-7.0, 5.0), (8.0, -2.0)], 0.3)]
+    told = _told_as(_crest([(-8.0, -7.5), (0.0, 1.0), (8.0, -2.0)], 0.35), true)
+    assert not told.fits
+    answers = [fitted(parts, told.place) for parts in retold(told)]
+    both = max((answer for answer in answers if answer is not None), key=lambda answer: answer.log_odds)
+    assert both.fits and both.log_odds > told.log_odds + 50.0 and both.kinds == ("ridge", "ridge")
+    ends = sorted(tuple(np.round(1e3 * end[:2]).tolist()) for part in both.parts for end in axis_of(part))
+    np.testing.assert_allclose(ends, [(-8.0, -8.0), (-7.0, 5.0), (8.0, -2.0), (8.0, 4.0)], atol=1.0)
+
+
+def test_a_bump_between_two_rows_is_pursued_where_it_is() -> None:
+    true = [_crest([(0.0, -7.5), (0.0, 0.0)], 0.4), _crest([(4.0, 4.2)], 0.5)]
+    told = _told_as(_crest([(0.0, -7.5), (0.0, 6.0)], 0.4), true)
+    spots = [axis[0] for axis in pursued(told)[0].crests.axes if (axis[0] == axis[1]).all()]
+    assert np.linalg.norm(1e3 * np.array(spots)[:, :2] - [4.0, 4.2], axis=1).min() < 0.5
+
+
+def test_what_leaves_nothing_is_not_told_anew() -> None:
+    told = _told_as(_crest([(0.0, -7.5), (0.0, 6.0)], 0.4), [_crest([(0.0, -7.5), (0.0, 6.0)], 0.4)])
+    assert told.is_explained and not list(retold(told))
+
+
+def test_a_line_and_a_bump_that_were_told_as_two_lines_are_counted() -> None:
+    case = run_counts(FIRST_BUILT_WITH + 389)
+    assert case.true == 3 and not case.left_open and case.stated[3] > 0.9
