@@ -112,18 +112,20 @@ def bell_heights(
         tip: m.
     """
     walkers, (bins, count) = len(out), nodes.shape[:2]
-    centres, upright = np.empty((3, bins * count)), np.empty((3, bins * count))
-    for m in range(bins * count):
+    size = bins * count
+    centres, upright = np.empty((3, size)), np.empty((3, size))
+    for m in range(size):
         for c in range(3):
             upright[c, m] = normals[m // count, c]
             centres[c, m] = nodes[m // count, m % count, c] + tip * upright[c, m]
-    levels, squares, alongs, upwards, rises = np.empty((5, bins * count))
-    asked, lifted, table = np.empty(bins * count, np.int64), np.empty(bins * count), np.empty(TABLE_PLACES)
-    places, overs, tangents = np.empty((3, bins * count))
+    # arrays of their own: of rows of one it is not seen that none overlaps another
+    levels, squares, alongs, upwards = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    rises, places, overs, tangents = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    asked, lifted, table = np.empty(size, np.int64), np.empty(size), np.empty(TABLE_PLACES)
     for w in range(walkers):
         _about(centres, upright, points[w], axes[w], levels, squares, alongs, upwards)
         far, widest = 1e-3 * tip, -1.0
-        for m in range(0, bins * count, count):  # nodes of one bin lie closer together than the table has to spare
+        for m in range(0, size, count):  # nodes of one bin lie closer together than the table has to spare
             toward, flat = 1.0 + curvature * levels[m], squares[m] - levels[m] * levels[m]
             # places are in the order of the tangents of their angles, which are quicker told
             if toward <= 0.0 or flat > widest * (toward * toward):
@@ -136,7 +138,7 @@ def bell_heights(
         while last > 0 and table[last] == -np.inf:
             last -= 1
         beyond, left = _tangent_beyond(last * spacing, curvature), 0
-        for m in range(bins * count):
+        for m in range(size):
             lifted[m] = 0.0
             toward, flat = 1.0 + curvature * levels[m], squares[m] - levels[m] * levels[m]
             if beyond < np.inf and (toward <= 0.0 or flat > beyond * (toward * toward)):
