@@ -12,7 +12,7 @@ import numpy as np
 from hw import FingerError, Move, Workspace
 from hw.simulated.noise_source import NoiseSource
 from hw.simulated.obstacles import Obstacles, pressed_from, stopped_or_landed
-from mapping import BoolArray, FloatArray, Surface, Trace, lengths
+from mapping import BoolArray, FloatArray, Surface, Trace, dots, lengths
 from mapping.geometry.contact import BallContact, Contacts
 from mapping.geometry.mesh import NearestPoint
 
@@ -173,7 +173,7 @@ class SimulatedFinger:
         """Where the ball rests at every sample of a sweep, and which samples are felt. Raises StoppedError."""
         stroke = 2.0 * self.tip_radius if self.stroke is None else self.stroke
         felt, over = pressed_from(self._ball, path, approach, stroke)
-        against = -(felt.normals * approach).sum(axis=1)
+        against = -dots(felt.normals, approach)
         touching = (felt.count > 0) & (over >= -stroke)
         keep = touching & (against >= np.cos(self.field_angle))
         fall = self._workspace.max_speed / self.rate

@@ -4,7 +4,7 @@ from timeit import repeat
 
 import numpy as np
 
-from mapping import lengths, sides_of_box
+from mapping import dots, lengths, sides_of_box
 
 
 def test_lengths_are_those_of_numpy_to_the_last_bit():
@@ -14,6 +14,11 @@ def test_lengths_are_those_of_numpy_to_the_last_bit():
         assert np.array_equal(lengths(vectors), np.linalg.norm(vectors, axis=-1))
         assert np.array_equal(lengths(np.asfortranarray(vectors)), np.linalg.norm(vectors, axis=-1))
     assert lengths(np.zeros((0, 3))).shape == (0,)
+
+
+def test_scalar_products_are_those_of_numpy_to_the_last_bit():
+    first, second = np.random.default_rng(6).normal(size=(2, 1000, 3))
+    assert np.array_equal(dots(first, second), (first * second).sum(axis=1))
 
 
 def test_sides_of_a_box_are_those_of_numpy():

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapping import FloatArray, IntArray, MappingError, Surface, read_only, sides_of_box
+from mapping import FloatArray, IntArray, MappingError, Surface, dots, read_only, sides_of_box
 from mapping.geometry.mesh.tree import TriangleTree
 
 # More queries at once than this only cost memory: some 500 bytes each on the way
@@ -89,7 +89,7 @@ class NearestPoint:
             normals[vertices] = self._vertex_normals[
                 self.surface.faces[face[vertices], part[vertices] - kernels.ON_VERTEX]
             ]
-        side = np.where(((query - points) * normals).sum(axis=1) >= 0.0, 1.0, -1.0)
+        side = np.where(dots(query - points, normals) >= 0.0, 1.0, -1.0)
         return Nearest(points, tree.scale_out(distance), side, normals, face, barycentric)
 
     @cached_property
