@@ -6,7 +6,7 @@ import numpy as np
 
 from hw.finger import Workspace
 from hw.move import Move
-from mapping import Trace, length_text
+from mapping import Trace, length_text, lengths
 
 # Noise takes samples out of the workspace that bounds the centre, but no sensor is worth reading that is off by more
 # than this many tip radii: scenes refuse such noise (explore3d.scene, MOST_NOISE)
@@ -32,7 +32,7 @@ def wrong_trace(move: Move, trace: Trace, workspace: Workspace) -> str | None:
             "possible: samples in the order of time, by one clock"
         )
     reach = OUTSIDE_RADII * trace.tip_radius
-    outside = np.linalg.norm(trace.centers - np.clip(trace.centers, workspace.low, workspace.high), axis=1)
+    outside = lengths(trace.centers - np.clip(trace.centers, workspace.low, workspace.high))
     if not len(trace) or np.median(outside) <= reach:
         return None
     low, high = (np.round(bound, 6).tolist() for bound in (workspace.low, workspace.high))

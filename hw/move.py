@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hw.errors import MoveError
-from mapping import FloatArray
+from mapping import FloatArray, lengths
 
 PURPOSES = ("travel", "approach", "sweep", "retreat")
 # These begin and end in free space, where nothing is to back off from
@@ -63,7 +63,7 @@ class Move:
     @property
     def length(self) -> float:
         """Length of the path, m."""
-        return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
+        return float(lengths(np.diff(self.path, axis=0)).sum())
 
     @property
     def duration(self) -> float:

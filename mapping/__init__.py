@@ -15,7 +15,10 @@ if TYPE_CHECKING:
         FloatArray as FloatArray,
         IntArray as IntArray,
         ShortArray as ShortArray,
+        dots as dots,
+        lengths as lengths,
         read_only as read_only,
+        sides_of_box as sides_of_box,
     )
     from mapping.assembly.assemble import assemble as assemble
     from mapping.base.base import Base as Base
@@ -74,7 +77,17 @@ if TYPE_CHECKING:
     from mapping.trace import Trace as Trace
 
 _PUBLIC = {
-    "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray", "ShortArray", "read_only"),
+    "arrays": (
+        "BoolArray",
+        "ComplexArray",
+        "FloatArray",
+        "IntArray",
+        "ShortArray",
+        "dots",
+        "lengths",
+        "read_only",
+        "sides_of_box",
+    ),
     "assembly.assemble": ("assemble",),
     "base.base": ("Base",),
     "base.fit": ("fit_base",),

@@ -13,7 +13,7 @@ from explore3d.pictures.camera import Camera
 from explore3d.pictures.chart import FONT_SIZE, drawing, image, pixels_png, text_at
 from explore3d.pictures.object import SUPERSAMPLING, cameras_for, pictured, shifted, view_directions
 from explore3d.pictures.render import Body, Picture, render
-from mapping import BoolArray, Feature, FloatArray, IntArray, Surface, length_unit
+from mapping import BoolArray, Feature, FloatArray, IntArray, Surface, length_unit, lengths
 from mapping.geometry.curvature import TOLD_SIDE, Neighbours
 from mapping.geometry.mesh import arclengths, directions, resample
 from mapping.model import feature_mesh
@@ -298,7 +298,7 @@ def _read_some(
     sides: tuple[FloatArray, FloatArray] | None,
 ) -> tuple[FloatArray, FloatArray]:
     """`_read` from those points (M, K) that are nearest, nearest first."""
-    apart = np.linalg.norm(points[which] - places[:, None], axis=2)
+    apart = lengths(points[which] - places[:, None])
     weights = (1.0 - (apart / np.maximum(apart[:, -1:], np.finfo(float).tiny)) ** 2) ** 2 + 1e-9
     nearest = apart[:, 0]
     if sides is not None:

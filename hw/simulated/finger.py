@@ -12,7 +12,7 @@ import numpy as np
 from hw import FingerError, Move, Workspace
 from hw.simulated.noise_source import NoiseSource
 from hw.simulated.obstacles import Obstacles, pressed_from, stopped_or_landed
-from mapping import BoolArray, FloatArray, Surface, Trace
+from mapping import BoolArray, FloatArray, Surface, Trace, dots, lengths
 from mapping.geometry.contact import BallContact, Contacts
 from mapping.geometry.mesh import NearestPoint
 
@@ -173,7 +173,7 @@ class SimulatedFinger:
         """Where the ball rests at every sample of a sweep, and which samples are felt. Raises StoppedError."""
         stroke = 2.0 * self.tip_radius if self.stroke is None else self.stroke
         felt, over = pressed_from(self._ball, path, approach, stroke)
-        against = -(felt.normals * approach).sum(axis=1)
+        against = -dots(felt.normals, approach)
         touching = (felt.count > 0) & (over >= -stroke)
         keep = touching & (against >= np.cos(self.field_angle))
         fall = self._workspace.max_speed / self.rate
@@ -208,7 +208,7 @@ def sampled(move: Move, rate: float) -> tuple[FloatArray, FloatArray, FloatArray
     spacing = move.speed / rate
     s = np.asarray(np.arange(int(along[-1] / spacing * (1 + 1e-12)) + 1) * spacing, dtype=np.float64)
     path, approach = (_interpolated(s, along, values) for values in (move.path, move.approach))
-    length = np.linalg.norm(approach, axis=1, keepdims=True)
+    length = lengths(approach)[:, None]
     if (length < 1e-6).any():
         raise FingerError(
             "the sweep turns its approach by 180 degrees between two waypoints; add waypoints between them"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hw import Move, StoppedError
-from mapping import BoolArray, FloatArray, place_text
+from mapping import BoolArray, FloatArray, lengths, place_text
 from mapping.geometry.contact import BallContact, Contacts
 from mapping.geometry.mesh import NearestPoint, cores
 
@@ -41,7 +41,7 @@ class Obstacles:
 
     def stem_along(self, centers: FloatArray, approach: FloatArray) -> None:
         """The stem behind a ball that sweeps. Raises StoppedError."""
-        step = np.linalg.norm(np.diff(centers, axis=0), axis=1)
+        step = lengths(np.diff(centers, axis=0))
         cell = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / (WAY_SPACING * self.tip_radius))
         kept = np.append(np.flatnonzero(np.diff(cell, prepend=-1.0)), len(cell) - 1)
         self._stem("the sweep", centers[kept], approach[kept])
@@ -110,7 +110,7 @@ def stopped_or_landed(
         field_angle: rad: the steepest rise that a ball rides over.
         fall: how far the ball comes down between two samples at most, m.
     """
-    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    steps = lengths(np.diff(path, axis=0))
     # where nothing is touched the finger stands where it is commanded to
     height = np.where(touching, over, 0.0)
     rise = np.diff(height)
@@ -138,7 +138,7 @@ def _dense(path: FloatArray, approach: FloatArray, spacing: float) -> tuple[Floa
 
     Where the approach turns round by 180 degrees it is taken to flip half-way.
     """
-    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    steps = lengths(np.diff(path, axis=0))
     count = np.maximum(1, np.ceil(steps / spacing).astype(np.int64))
     between_waypoints = [k + np.arange(n) / n for k, n in enumerate(count)]
     place = np.concatenate([*between_waypoints, [float(len(steps))]])

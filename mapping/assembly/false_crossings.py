@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mapping import Feature
+from mapping import Feature, lengths
 from mapping.assembly.linking import Inspection, uphill
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
@@ -31,7 +31,7 @@ def is_unseen(crossing: Crossing, inspection: Inspection) -> bool:
     if crossing.snr < CLAIM or crossing.half_width < 1.2 * inspection.spacing:
         return False
     own = inspection.of_sweep(crossing.sweep)
-    heights, gap = inspection.height[own], np.linalg.norm(inspection.points[own] - crossing.point, axis=1)
+    heights, gap = inspection.height[own], lengths(inspection.points[own] - crossing.point)
     inside, beside = gap < crossing.half_width, (gap > 1.2 * crossing.half_width) & (gap < 3 * crossing.half_width)
     if not inside.any():
         return False
@@ -52,7 +52,7 @@ def is_plateau_end(crossing: Crossing, inspection: Inspection) -> bool:
     side beside: what was detected is the end of what the sweep ran along."""
     own = inspection.of_sweep(crossing.sweep)
     heights = np.sign(crossing.height) * inspection.height[own]
-    gap = np.linalg.norm(inspection.points[own] - crossing.point, axis=1)
+    gap = lengths(inspection.points[own] - crossing.point)
     middle = gap < 0.5 * crossing.half_width
     if not middle.any():
         return False
@@ -80,7 +80,7 @@ def is_open(crossing: Crossing, inspection: Inspection) -> bool:
     sides = (heights[:2].mean(), heights[-2:].mean())
     up = max(STILL_UP * abs(crossing.height), 4 * float(np.median(inspection.sd[own])))
     # the two ends of the disturbance itself, in places of this sweep
-    nearest = int(np.linalg.norm(inspection.points[own] - crossing.point, axis=1).argmin())
+    nearest = int(lengths(inspection.points[own] - crossing.point).argmin())
     return any(
         side > up and bool((part > 0.5 * up).all())
         for side, part in zip(sides, (heights[: nearest + 1], heights[nearest:]), strict=True)

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mapping import FloatArray, IntArray, Trace
+from mapping import FloatArray, IntArray, Trace, lengths
 from mapping.base.base import Base, Feet
 
 # Blocks of a sweep are long enough once doubling them shortens its length by less than this: noise zigzags,
@@ -273,4 +273,4 @@ def _block_means(points: FloatArray, size: int) -> FloatArray:
 
 
 def _length(points: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    return float(lengths(np.diff(points, axis=0)).sum())

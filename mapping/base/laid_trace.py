@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping import BoolArray, FloatArray, IntArray, Trace
+from mapping import BoolArray, FloatArray, IntArray, Trace, dots, lengths
 from mapping.base.base import Base, Feet
 from mapping.base.cells import Cells
 from mapping.base.height_profile import SweepHeights, arclength, height_profiles
@@ -108,7 +108,7 @@ class LaidSweep:
             turn = np.abs(kept.normals - up).max(axis=1)
             apart = kept.points - np.repeat(kept.points[starts], counts, axis=0)
             flat = turn < ONE_PLANE
-            flat &= np.abs((apart * up).sum(1)) <= ONE_PLANE * np.linalg.norm(apart, axis=1)
+            flat &= np.abs(dots(apart, up)) <= ONE_PLANE * lengths(apart)
             plane = np.logical_and.reduceat(flat, starts)
             known[known] = plane
             runs = (self.trace.centers[samples], kept.points, kept.normals, kept.height)
@@ -271,7 +271,7 @@ class LaidTrace(Trace):
             far = distance > LONGEST_KNOWN_GAP * self.tip_radius
             if far.any():
                 found[far] = self.base.foot(centers[far], self.tip_radius).normals
-            return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+            return np.asarray(found / lengths(found)[:, None])
 
         return between_known
 

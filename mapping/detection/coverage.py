@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, IntArray, Surface
+from mapping import BoolArray, FloatArray, IntArray, Surface, lengths
 from mapping.geometry.mesh import NEAREST_COST, BoxedPoints, by_shares
 
 # Samples of faces looked at, at most
@@ -160,7 +160,7 @@ def _parts(count: int) -> Iterator[slice]:
 
 def _lost(away: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
     """(N,) m: height along the normals (N, 3) at which the ball is touched whose centre lies so far away (N, 3), m."""
-    distance = np.linalg.norm(away, axis=1)
+    distance = lengths(away)
     along = np.einsum("ni,ni->n", away, normals)
     outside = (distance - tip_radius) * (distance + tip_radius)
     root = along**2 - outside

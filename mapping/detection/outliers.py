@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, IntArray
+from mapping import BoolArray, FloatArray, IntArray, lengths
 from mapping.base import LaidSweep, SweepHeights
 from mapping.instrument import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_sd
 
@@ -98,7 +98,7 @@ def _sample_heights(sweep: LaidSweep, profile: SweepHeights, begin: int, end: in
     if profile.feet is None:
         return sweep.feet(slice(begin, end)).height
     normal = profile.centers - profile.feet
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+    normal /= np.maximum(lengths(normal), np.finfo(float).tiny)[:, None]
     bins = np.repeat(np.arange(len(profile.height)), np.diff(profile.first))
     away = np.einsum("ij,ij->i", sweep.trace.centers[begin:end] - profile.centers[bins], normal[bins])
     return np.asarray(profile.height[bins] + away)

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from hw import Move
-from mapping import BoolArray, FloatArray, IntArray
+from mapping import BoolArray, FloatArray, IntArray, lengths
 from mapping.base import Base
 from mapping.geometry.contact import BallContact
 from planners.paths.carrier import FREE_SINKING, Carrier
@@ -185,7 +185,7 @@ def resampled(path: FloatArray, approach: FloatArray, spacing: float) -> tuple[F
     place = np.append(place, float(len(steps)))
     number = np.arange(len(path))
     path, approach = (np.column_stack([np.interp(place, number, v[:, k]) for k in range(3)]) for v in (path, approach))
-    length = np.linalg.norm(approach, axis=1, keepdims=True)
+    length = lengths(approach)[:, None]
     return path, np.divide(approach, length, out=np.tile([0.0, 0.0, -1.0], (len(path), 1)), where=length > 0)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import BoolArray, ComplexArray, FloatArray, IntArray, Trace
+from mapping import BoolArray, ComplexArray, FloatArray, IntArray, Trace, lengths
 from mapping.base import Base, Feet
 from mapping.instrument import robust_scale
 
@@ -214,4 +214,4 @@ def _round(places: FloatArray, normals: FloatArray) -> FloatArray:
 def _median_distance(centers: FloatArray, k: int) -> float:
     # every thousandth part tells the median
     begin = np.arange(0, len(centers) - k, max(1, len(centers) // 1000))
-    return float(np.median(np.linalg.norm(centers[begin + k] - centers[begin], axis=1))) if len(begin) else 0.0
+    return float(np.median(lengths(centers[begin + k] - centers[begin]))) if len(begin) else 0.0

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, IntArray, Trace
+from mapping import BoolArray, FloatArray, IntArray, Trace, lengths
 from mapping.base import FEW_SAMPLES_PER_BIN, UNEVEN, Base, LaidSweep, LaidTrace
 from mapping.detection import LADDER, smallest_crest
 from mapping.detection.filters import FILTER_BINS_PER_HALF_WIDTH
@@ -132,7 +132,7 @@ def _jumps(part: Trace, base: Base, reach: float) -> list[int]:
     A reading thrown off for a moment comes back, a crest that the ball climbs lifts it off the base only. A gap that
     the times tell of is no cut: detection cuts its heights there, and knows how long it is.
     """
-    steps = np.linalg.norm(np.diff(part.centers, axis=0), axis=1)
+    steps = lengths(np.diff(part.centers, axis=0))
     moving = steps[steps > 0]
     if len(moving) < 2:
         return []

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from mapping import BoolArray, Feature, FloatArray, IntArray
+from mapping import BoolArray, Feature, FloatArray, IntArray, lengths
 from mapping.base import LaidSweep, LaidTrace
 from mapping.estimate.envelope.refuted_tip import (
     BEND_SDS,
@@ -155,7 +155,7 @@ def _crossings(laid: LaidTrace, line: Feature) -> Iterator[_Crossed]:
         on, place = nearest_on(centers[near], axis)
         leg = np.minimum(np.searchsorted(arclengths(axis), place, side="right") - 1, len(axis) - 2)
         forth = axis[leg + 1] - axis[leg]
-        forth /= np.maximum(np.linalg.norm(forth, axis=1, keepdims=True), np.finfo(float).tiny)
+        forth /= np.maximum(lengths(forth)[:, None], np.finfo(float).tiny)
         up = line.normals[leg]
         aside = np.einsum("ij,ij->i", centers[near] - on, np.cross(up, forth))
         told = (np.abs(aside) < reach) & (place > ends) & (place < length - ends)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapping import BoolArray, EnvelopeError, FloatArray, IntArray, Surface, Trace
+from mapping import BoolArray, EnvelopeError, FloatArray, IntArray, Surface, Trace, lengths
 from mapping.base import Base, LaidTrace
 from mapping.estimate.envelope.alpha_shape import alpha_estimate
 from mapping.estimate.envelope.bridging import bridged_faces, rest_between, resting_points, split
@@ -202,7 +202,7 @@ class _Thinning:
         if not len(points.points):
             return points
         way = points.points if self.last is None else np.vstack([self.last, points.points])
-        self.length += float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+        self.length += float(lengths(np.diff(way, axis=0)).sum())
         self.last = points.points[-1]
         return points.select(thinned(points.points, points.sweep, self.step, _bounding(points)))
 

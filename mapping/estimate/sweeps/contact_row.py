@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping import FloatArray, IntArray
+from mapping import FloatArray, IntArray, lengths
 from mapping.estimate.sweeps.kinks import NO_KINKS, Kinks, find_kinks
 from mapping.estimate.sweeps.labels import BRIDGED, EXTRAPOLATED, TOUCHED
 from mapping.estimate.sweeps.tangents import tangents, unit
@@ -57,7 +57,7 @@ def contact_row(centers: FloatArray, outward: FloatArray, tip_radius: float, ope
     between them, points of the resting ball: the strip below them cannot be reached (theory section 4).
     """
     kinks = find_kinks(centers, outward) if open_kinks else NO_KINKS
-    spacing = np.linalg.norm(np.diff(centers, axis=0), axis=1)
+    spacing = lengths(np.diff(centers, axis=0))
     usual = float(np.median(spacing)) if len(spacing) else 0.0
     lifted = np.flatnonzero(spacing > LIFTED * usual) + 1
     kinks = _without(kinks, lifted)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import FloatArray, IntArray
+from mapping import FloatArray, IntArray, lengths
 from mapping.estimate.sweeps.tangents import STENCIL, chord_lengths, lagrange, unit
 
 # The concave turn at a kink must exceed the turns beside it by this factor.
@@ -48,12 +48,12 @@ def _outstanding_turns(points: FloatArray, outward: FloatArray) -> IntArray:
     if len(points) < 4:
         return np.zeros(0, dtype=np.int64)
     steps = np.diff(points, axis=0)
-    length = np.linalg.norm(steps, axis=1)
+    length = lengths(steps)
     directions = unit(steps)
     bend = np.diff(directions, axis=0)
     side = np.sign(np.einsum("ij,ij->i", bend, outward[1:-1]))
     turn = np.zeros(len(points) + 2)  # turn[i + 1] belongs to sample i; borders turn by nothing
-    turn[2:-2] = side * 2 * np.arcsin(np.clip(np.linalg.norm(bend, axis=1) / 2, 0, 1))
+    turn[2:-2] = side * 2 * np.arcsin(np.clip(lengths(bend) / 2, 0, 1))
     here = turn[1:-2] + turn[2:-1]  # both ends of gap i
     beside = np.abs(turn[:-3]) + np.abs(turn[3:])
     rounding = 16 * np.finfo(float).eps * np.abs(points).max() / np.maximum(length, np.finfo(float).tiny)

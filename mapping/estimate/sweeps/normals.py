@@ -11,7 +11,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, IntArray, Trace
+from mapping import BoolArray, FloatArray, IntArray, Trace, lengths
 from mapping.estimate.sweeps.contact_row import ContactRow, contact_row
 from mapping.estimate.sweeps.curve import SweepCurve
 from mapping.estimate.sweeps.labels import TOUCHED
@@ -169,7 +169,7 @@ class _Neighbourhood:
             counts = np.einsum("nc,nkc->nk", outward[own], self._sides[index]) > TOLD_SIDE
             slopes[part], doubt[part] = _slopes(arm, distance, counts, *(axis[own] for axis in frames))
         _, across, up = frames
-        s = np.cumsum(np.linalg.norm(np.diff(centers, axis=0, prepend=centers[:1]), axis=1))
+        s = np.cumsum(lengths(np.diff(centers, axis=0, prepend=centers[:1])))
         slope = np.interp(s, s[fitted], slopes)
         return unit(across + slope[:, None] * up), np.interp(s, s[fitted], doubt)
 

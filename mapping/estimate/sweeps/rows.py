@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, IntArray
+from mapping import BoolArray, FloatArray, IntArray, lengths
 from mapping.geometry.mesh import BoxedPoints
 
 # Places along a line from which its distance to another is taken: the distance that a fifth of them lie beyond is then
@@ -91,7 +91,7 @@ def thinned(points: FloatArray, sweep: IntArray, spacing: float, keep: BoolArray
     """Indices of samples at least `spacing` apart along each sweep, with its ends and whatever `keep` marks."""
     if spacing <= 0:
         return np.arange(len(points))
-    steps = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1]), axis=1)
+    steps = lengths(np.diff(points, axis=0, prepend=points[:1]))
     border = np.r_[True, np.diff(sweep) != 0]
     length = np.cumsum(np.where(border, 0.0, steps))
     # A sweep is cut into equal cells of its length; the first sample of each cell stays.

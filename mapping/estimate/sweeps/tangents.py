@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapping import FloatArray, IntArray
+from mapping import FloatArray, IntArray, lengths
 
 STENCIL = 5
 # A window of points must be smoother than the central one by this factor to displace it.
@@ -13,7 +13,7 @@ OFF_CENTRE_PENALTY = 4.0
 
 def chord_lengths(points: FloatArray) -> FloatArray:
     """(N,) distance along the polyline (N, 3) since its first point, m."""
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    steps = lengths(np.diff(points, axis=0))
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapping import ContactError, FloatArray
+from mapping import ContactError, FloatArray, lengths
 
 MOST_PATH_SAMPLES = 100_000_000
 
@@ -82,7 +82,7 @@ def unit_directions(directions: ArrayLike, count: int) -> FloatArray:
         first = int(bad.argmax())
         raise ContactError(f"directions must be finite and not zero; number {first} is {array[first].tolist()}")
     array = np.ldexp(array, 1 - np.frexp(largest)[1])  # so that squares neither over- nor underflow
-    return np.ascontiguousarray(array / np.linalg.norm(array, axis=1, keepdims=True))
+    return np.ascontiguousarray(array / lengths(array)[:, None])
 
 
 def checked_points(points: ArrayLike, name: str) -> FloatArray:

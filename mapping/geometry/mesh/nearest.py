@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapping import FloatArray, IntArray, MappingError, Surface, read_only
+from mapping import FloatArray, IntArray, MappingError, Surface, dots, read_only, sides_of_box
 from mapping.geometry.mesh.tree import TriangleTree
 
 # More queries at once than this only cost memory: some 500 bytes each on the way
@@ -89,7 +89,7 @@ class NearestPoint:
             normals[vertices] = self._vertex_normals[
                 self.surface.faces[face[vertices], part[vertices] - kernels.ON_VERTEX]
             ]
-        side = np.where(((query - points) * normals).sum(axis=1) >= 0.0, 1.0, -1.0)
+        side = np.where(dots(query - points, normals) >= 0.0, 1.0, -1.0)
         return Nearest(points, tree.scale_out(distance), side, normals, face, barycentric)
 
     @cached_property
@@ -248,7 +248,7 @@ class BoxedPoints:
         for axis in range(3):  # of ten million points all at once would take half a GB for a moment
             steps += np.square(np.diff(self.points[:, axis]))
         steps = np.sqrt(steps, out=steps)
-        if len(steps) and POINTS_PER_BOX * np.median(steps) > LONGEST_BOX * float(np.ptp(points, axis=0).max()):
+        if len(steps) and POINTS_PER_BOX * np.median(steps) > LONGEST_BOX * float(sides_of_box(points).max()):
             from scipy.spatial import cKDTree
 
             self._order = cKDTree(points, leafsize=POINTS_PER_BOX).indices.astype(np.int64)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapping import FloatArray
+from mapping import FloatArray, lengths
 
 
 def arclengths(points: FloatArray) -> FloatArray:
     """(K,) distance from the first of the points (K, 3) along the polyline, m."""
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    steps = lengths(np.diff(points, axis=0))
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
@@ -64,4 +64,4 @@ def nearest_on(points: FloatArray, polyline: FloatArray) -> tuple[FloatArray, Fl
 
 def distances(points: FloatArray, axis: FloatArray) -> FloatArray:
     """(N,) distances of points (N, 3) from a polyline (K, 3), m."""
-    return np.asarray(np.linalg.norm(points - nearest_on(points, axis)[0], axis=1))
+    return lengths(points - nearest_on(points, axis)[0])

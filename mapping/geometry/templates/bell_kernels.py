@@ -19,8 +19,8 @@ LEAST_ROOM = 0.01
 TABLE_SPARE = 0.05
 # Share by which a bound is widened that leaves places out: what it leaves out is zero to the last digit
 BOUND_MARGIN = 1e-9
-# Tangents of angles up to which five terms of the arc tangent's series are exact to rounding: t^11 / 11 of t
-SLIGHT = 0.04
+# Tangents of angles up to which so many terms of the arc tangent's series are exact to rounding
+SLIGHT, SLIGHT_TERMS = 0.3, 13
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -35,19 +35,31 @@ def _reach(height, half, taper, curvature, tip):  # type: ignore[no-untyped-def]
 def _place(level, square, curvature):  # type: ignore[no-untyped-def]
     """Distance from the axis, along the ball that a bell stands on, and height over it, m, of a place in space.
 
-    It is `level` up the axis, m, and the root of `square` away from where the bell stands.
+    It is `level` up the axis, m, and the root of `square` away from where the bell stands. The distance holds where the
+    tangent of its angle, the last that is returned, is SLIGHT at most: there is no branch, so that several places are
+    taken at once.
     """
     aside = np.sqrt(max(square - level * level, 0.0))
     toward = 1.0 + curvature * level
-    over = (2.0 * level + curvature * square) / (np.sqrt(toward**2 + (curvature * aside) ** 2) + 1.0)
-    if curvature == 0.0:
-        return aside, over
-    if toward > 0.0 and abs(curvature) * aside < SLIGHT * toward:  # nearly everywhere, at a third of the time
-        t = curvature * aside / toward
-        u = t * t
-        series = 1.0 - u * (1.0 / 3.0 - u * (1.0 / 5.0 - u * (1.0 / 7.0 - u * (1.0 / 9.0))))
-        return aside / toward * series, over
-    return np.arctan2(curvature * aside, toward) / curvature, over
+    over = (2.0 * level + curvature * square) / (
+        np.sqrt(toward * toward + (curvature * aside) * (curvature * aside)) + 1.0
+    )
+    flat = aside / toward
+    tangent = curvature * flat
+    series = 0.0
+    for k in range(SLIGHT_TERMS, 0, -1):
+        series = tangent * tangent * (1.0 / (2.0 * k + 1.0) - series)
+    return flat * (1.0 - series), over, abs(tangent) if toward > 0.0 else np.inf
+
+
+@njit(cache=True, error_model="numpy")
+def _place_anywhere(level, square, curvature):  # type: ignore[no-untyped-def]
+    """The distance of `_place`, however far round the ball."""
+    place, _, tangent = _place(level, square, curvature)
+    if tangent <= SLIGHT:
+        return place
+    aside = np.sqrt(max(square - level * level, 0.0))
+    return np.arctan2(curvature * aside, 1.0 + curvature * level) / curvature
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -99,49 +111,91 @@ def bell_heights(
         heights, halves, tapers: (W,) m, m (half width at half height), and 1: the sections of `smooth_trace`.
         tip: m.
     """
-    walkers, bins = out.shape
-    count, table = nodes.shape[1], np.empty(TABLE_PLACES)
+    walkers, (bins, count) = len(out), nodes.shape[:2]
+    size = bins * count
+    centres, upright = np.empty((3, size)), np.empty((3, size))
+    for m in range(size):
+        for c in range(3):
+            upright[c, m] = normals[m // count, c]
+            centres[c, m] = nodes[m // count, m % count, c] + tip * upright[c, m]
+    # arrays of their own: of rows of one it is not seen that none overlaps another
+    levels, squares, alongs, upwards = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    rises, places, overs, tangents = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    asked, lifted, table = np.empty(size, np.int64), np.empty(size), np.empty(TABLE_PLACES)
     for w in range(walkers):
-        px, py, pz = points[w, 0], points[w, 1], points[w, 2]
-        ax, ay, az = axes[w, 0], axes[w, 1], axes[w, 2]
+        _about(centres, upright, points[w], axes[w], levels, squares, alongs, upwards)
         far, widest = 1e-3 * tip, -1.0
-        for i in range(bins):  # nodes of one bin lie closer together than the table has to spare
-            x = nodes[i, 0, 0] + tip * normals[i, 0] - px
-            y = nodes[i, 0, 1] + tip * normals[i, 1] - py
-            z = nodes[i, 0, 2] + tip * normals[i, 2] - pz
-            level, square = x * ax + y * ay + z * az, x * x + y * y + z * z
-            toward = 1.0 + curvature * level
+        for m in range(0, size, count):  # nodes of one bin lie closer together than the table has to spare
+            toward, flat = 1.0 + curvature * levels[m], squares[m] - levels[m] * levels[m]
             # places are in the order of the tangents of their angles, which are quicker told
-            if toward <= 0.0 or square - level * level > widest * (toward * toward):
-                far = max(far, _place(level, square, curvature)[0])
-                widest = (square - level * level) / (toward * toward) if toward > 0.0 else widest
+            if toward <= 0.0 or flat > widest * (toward * toward):
+                far = max(far, _place_anywhere(levels[m], squares[m], curvature))
+                widest = flat / (toward * toward) if toward > 0.0 else widest
         far = min((1.0 + TABLE_SPARE) * far + heights[w], _reach(heights[w], halves[w], tapers[w], curvature, tip))
         spacing = far / (TABLE_PLACES - 2)
         smooth_trace(heights[w], halves[w], tapers[w], tip, curvature, table, spacing)
         last = TABLE_PLACES - 1
         while last > 0 and table[last] == -np.inf:
             last -= 1
-        beyond = _tangent_beyond(last * spacing, curvature)
+        beyond, left = _tangent_beyond(last * spacing, curvature), 0
+        for m in range(size):
+            lifted[m] = 0.0
+            toward, flat = 1.0 + curvature * levels[m], squares[m] - levels[m] * levels[m]
+            if beyond < np.inf and (toward <= 0.0 or flat > beyond * (toward * toward)):
+                continue  # most nodes are further away than the bell is felt
+            levels[left], squares[left], alongs[left], upwards[left] = levels[m], squares[m], alongs[m], upwards[m]
+            asked[left], rises[left] = m, 0.0
+            left += 1
+        for _ in range(CENTRE_ROUNDS):
+            _standing(levels, squares, alongs, upwards, rises, left, curvature, spacing, places, overs, tangents)
+            unsettled = 0
+            for j in range(left):
+                rise = rises[j]
+                if tangents[j] > SLIGHT:
+                    level, square = levels[j] + rise * upwards[j], squares[j] + rise * (2.0 * alongs[j] + rise)
+                    places[j] = _place_anywhere(level, square, curvature) / spacing
+                place = places[j]
+                k = int(place)
+                if k >= TABLE_PLACES - 1 or table[k] == -np.inf or table[k + 1] == -np.inf:
+                    lifted[asked[j]] = 0.0
+                    continue
+                more = _between(table, k, place - k) - (overs[j] - tip)
+                lifted[asked[j]] = rise + more
+                if abs(more) < CENTRE_SETTLED * heights[w]:
+                    continue
+                levels[unsettled], squares[unsettled] = levels[j], squares[j]
+                alongs[unsettled], upwards[unsettled] = alongs[j], upwards[j]
+                asked[unsettled], rises[unsettled] = asked[j], rise + more
+                unsettled += 1
+            left = unsettled
         for i in range(bins):
-            nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
-            upward, total = nx * ax + ny * ay + nz * az, 0.0
+            total = 0.0
             for q in range(count):
-                x, y, z = nodes[i, q, 0] + tip * nx - px, nodes[i, q, 1] + tip * ny - py, nodes[i, q, 2] + tip * nz - pz
-                level, square, along = x * ax + y * ay + z * az, x * x + y * y + z * z, x * nx + y * ny + z * nz
-                toward = 1.0 + curvature * level
-                if beyond < np.inf and (toward <= 0.0 or square - level * level > beyond * (toward * toward)):
-                    continue  # most nodes are further away than the bell is felt
-                rise = 0.0
-                for _ in range(CENTRE_ROUNDS):
-                    place, over = _place(level + rise * upward, square + rise * (2.0 * along + rise), curvature)
-                    place /= spacing
-                    k = int(place)
-                    if k >= TABLE_PLACES - 1 or table[k] == -np.inf or table[k + 1] == -np.inf:
-                        rise = 0.0
-                        break
-                    more = _between(table, k, place - k) - (over - tip)
-                    rise += more
-                    if abs(more) < CENTRE_SETTLED * heights[w]:
-                        break
-                total += max(rise, 0.0)
+                total += max(lifted[i * count + q], 0.0)
             out[w, i] = total / count
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _about(centres, upright, point, axis, levels, squares, alongs, upwards):  # type: ignore[no-untyped-def]
+    """Of the tip's centres (3, N) on the base how high they are up an axis, m, their squared distance from where that
+    stands, m^2, its part along their normals (3, N), m, and the cosine of these with the axis; written."""
+    px, py, pz = point[0], point[1], point[2]
+    ax, ay, az = axis[0], axis[1], axis[2]
+    for m in range(len(levels)):
+        x, y, z = centres[0, m] - px, centres[1, m] - py, centres[2, m] - pz
+        nx, ny, nz = upright[0, m], upright[1, m], upright[2, m]
+        levels[m], squares[m] = x * ax + y * ay + z * az, x * x + y * y + z * z
+        alongs[m], upwards[m] = x * nx + y * ny + z * nz, nx * ax + ny * ay + nz * az
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _standing(  # type: ignore[no-untyped-def]
+    levels, squares, alongs, upwards, rises, count, curvature, spacing, places, overs, tangents
+):
+    """`_place` of the first so many centres, each risen along its normal, distances in spacings; written to the last
+    three."""
+    for j in range(count):
+        rise = rises[j]
+        level, square = levels[j] + rise * upwards[j], squares[j] + rise * (2.0 * alongs[j] + rise)
+        place, overs[j], tangents[j] = _place(level, square, curvature)
+        places[j] = place / spacing

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from mapping import FloatArray
-from mapping.geometry.templates.course_kernels import about_course
+from mapping.geometry.templates.course_kernels import about_course, lay_about_course
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -46,25 +46,27 @@ def groove_heights(
     rim by the first, under the rim at an end by the second, and rests on whichever holds it highest.
     """
     walkers, bins = out.shape
-    nodes = s.shape[1]
+    nodes, count, modes = s.shape[1], s.size, basis.shape[1]
+    place, aside, stretch = np.empty(count), np.empty(count), np.empty(count)
+    s, lateral, basis = s.reshape(count), lateral.reshape(count), basis.reshape((2, modes, count))
+    bend, bend_along = bend.reshape(count), bend_along.reshape(count)
     for w in range(walkers):
         half, first, last = 0.5 * widths[w], ends[w, 0], ends[w, 1]
+        lay_about_course(s, lateral, basis, courses[w], place, aside, stretch)
         for i in range(bins):
             total = 0.0
-            for q in range(nodes):
-                place, aside, stretch = about_course(s, lateral, basis, courses[w], i, q)
-                along = stretch * min(place - first, last - place)
-                if along <= 0.0:
+            for j in range(i * nodes, (i + 1) * nodes):
+                along, across = stretch[j] * min(place[j] - first, last - place[j]), half - abs(aside[j])
+                if along <= 0.0 or across <= 0.0:
                     continue
-                across = half - abs(aside)
                 out_along, out_across = rounded[w] - along, rounded[w] - across
                 if out_along > 0.0 and out_across > 0.0:
                     square = out_along * out_along + out_across * out_across
-                    bent = bend[i, q] + out_along * out_along / square * (bend_along[i, q] - bend[i, q])
+                    bent = bend[j] + out_along * out_along / square * (bend_along[j] - bend[j])
                     total += rim(rounded[w] - np.sqrt(square), tip, depths[w], bent)
                 else:
-                    beside = rim(across, tip, depths[w], bend[i, q])
-                    total += max(beside, rim(along, tip, depths[w], bend_along[i, q]))
+                    beside = rim(across, tip, depths[w], bend[j])
+                    total += max(beside, rim(along, tip, depths[w], bend_along[j]))
             out[w, i] = total / nodes
 
 

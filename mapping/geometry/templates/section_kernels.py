@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from mapping import FloatArray
-from mapping.geometry.templates.course_kernels import about_course
+from mapping import FloatArray, IntArray
+from mapping.geometry.templates.course_kernels import lay_about_course
 
 # Share by which a bound is widened that leaves places out: what it leaves out is zero to the last digit
 BOUND_MARGIN = 1e-9
@@ -52,71 +52,104 @@ def section_heights(
         tip: radius of the fingertip, m.
         out: (W, n) heights, m.
     """
-    walkers, bins = out.shape
-    modes, nodes, corners = basis.shape[1], s.shape[1], across.shape[1]
-    nearest, farthest, lowest = np.empty(bins), np.zeros(bins), np.full(bins, np.inf)
-    sway, turn = np.zeros((bins, modes)), np.zeros((bins, modes))
-    first, last = np.full(bins, np.inf), np.full(bins, -np.inf)
-    runs, falls, flanks = np.empty(corners), np.empty(corners), np.empty(corners)
-    for i in range(bins):
-        nearest[i] = np.inf
+    nodes, modes, corners = s.shape[1], basis.shape[1], across.shape[1]
+    near = _near(s, lateral, basis, bend, bend_along, courses, ends, across, up, tip + shoulders.max())
+    count, first = len(near) * nodes, 0
+    # arrays of their own: of rows of one it is not seen that none overlaps another
+    felt, along, beside = np.empty((2, modes, count)), np.empty(count), np.empty(count)
+    bent, bent_along = np.empty(count), np.empty(count)
+    for i in near:
         for q in range(nodes):
-            nearest[i], farthest[i] = min(nearest[i], abs(lateral[i, q])), max(farthest[i], abs(lateral[i, q]))
-            lowest[i] = min(lowest[i], bend[i, q], bend_along[i, q])
-            first[i], last[i] = min(first[i], s[i, q]), max(last[i], s[i, q])
+            along[first], beside[first] = s[i, q], lateral[i, q]
+            bent[first], bent_along[first] = bend[i, q], bend_along[i, q]
             for m in range(modes):
-                sway[i, m] = max(sway[i, m], abs(basis[0, m, i, q]))
-                turn[i, m] = max(turn[i, m], abs(basis[1, m, i, q]))
-    for w in range(walkers):
+                felt[0, m, first], felt[1, m, first] = basis[0, m, i, q], basis[1, m, i, q]
+            first += 1
+    place, aside, stretch = np.empty(count), np.empty(count), np.empty(count)
+    runs, falls, flanks = np.empty((3, corners))
+    out[:] = 0.0
+    for w in range(len(out)):
         top, crest, radius = across[w, 0], up[w, 0], tip + shoulders[w]
-        least = (1.0 + BOUND_MARGIN) * 2.0 * crest
+        least, foot = (1.0 + BOUND_MARGIN) * 2.0 * crest, across[w, corners - 1]
         for k in range(corners - 1):
             runs[k], falls[k] = across[w, k + 1] - across[w, k], up[w, k] - up[w, k + 1]
             flanks[k] = np.sqrt(runs[k] * runs[k] + falls[k] * falls[k])
-        for i in range(bins):
-            swayed, turned = 0.0, 0.0
-            for m in range(modes):
-                swayed += abs(courses[w, m]) * sway[i, m]
-                turned += abs(courses[w, m]) * turn[i, m]
-            # a ball of radius R at x beside all corners stands x^2 / 2 R lower than on the crest, at least
-            foot = across[w, corners - 1]
-            beyond = max(ends[w, 0] - last[i], first[i] - ends[w, 1]) - turned * (farthest[i] + swayed) - (foot - top)
-            gap = max((nearest[i] - swayed) / np.sqrt(1.0 + turned * turned) - foot, beyond)
-            # the ball over a plane, at most, that is felt as the tip is over the base
-            if gap > 0.0 and gap * gap > least * radius / max(1.0 + radius * lowest[i], 1e-3):
-                out[w, i] = 0.0
-                continue
+        lay_about_course(along, beside, felt, courses[w], place, aside, stretch)
+        _about_top(bent, bent_along, ends[w], top, rounded[w], radius, place, aside, stretch)
+        for b in range(len(near)):
             total = 0.0
-            for q in range(nodes):
-                place, aside, stretch = about_course(s, lateral, basis, courses[w], i, q)
-                beyond = stretch * max(ends[w, 0] - place, place - ends[w, 1])
-                aside, around = abs(aside), beyond + rounded[w]
-                bent = bend[i, q]
-                if around > 0.0:
-                    # the distance of a rectangle that is smaller by the corners' radius all round
-                    core = top - rounded[w]
-                    side = max(aside - core, 0.0)
-                    away = np.sqrt(around * around + side * side)
-                    bent += (around / away) ** 2 * (bend_along[i, q] - bent)
-                    aside = core + away
-                ball, best = radius / max(1.0 + radius * bent, 1e-3), 0.0
-                if aside <= top:
+            for j in range(b * nodes, (b + 1) * nodes):
+                away, ball, best = aside[j], stretch[j], 0.0
+                if away > foot and (away - foot) * (away - foot) > least * ball:
+                    continue
+                if away <= top:
                     best = crest
                 for k in range(corners):
                     if up[w, k] <= best:  # neither this corner nor what is below it holds the ball higher
                         break
-                    gap = abs(aside - across[w, k])
+                    gap = abs(away - across[w, k])
                     if gap < ball and gap * gap <= least * ball:
                         best = max(best, up[w, k] - gap * gap / (ball + np.sqrt((ball - gap) * (ball + gap))))
                     if k + 1 < corners:
                         run, fall, flank = runs[k], falls[k], flanks[k]
                         # most flanks are too steep to be touched: that is told without a division
-                        touched = (aside - across[w, k]) * flank >= (1.0 - BOUND_MARGIN) * ball * fall
+                        touched = (away - across[w, k]) * flank >= (1.0 - BOUND_MARGIN) * ball * fall
                         if run > 0.0 and fall > 0.0 and touched:
-                            at = aside - ball * fall / flank - across[w, k]
+                            at = away - ball * fall / flank - across[w, k]
                             if at >= 0.0 and at <= run:
                                 # R (run / flank - 1) without the difference of near numbers
                                 lift = -ball * fall * fall / (flank * (flank + run))
                                 best = max(best, up[w, k] - at * fall / run + lift)
                 total += best
-            out[w, i] = total / nodes
+            out[w, near[b]] = total / nodes
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _near(  # type: ignore[no-untyped-def]
+    s, lateral, basis, bend, bend_along, courses, ends, across, up, radius
+) -> IntArray:
+    """The bins that some of the lines may be felt in; `radius` is the largest of a ball, m.
+
+    A ball of radius R at x beside all corners stands x^2 / 2 R lower than on the crest, at least.
+    """
+    bins, modes = len(s), basis.shape[1]
+    most, foot, flank = np.zeros(modes), across[:, -1].max(), (across[:, -1] - across[:, 0]).max()
+    for m in range(modes):
+        most[m] = np.abs(courses[:, m]).max()
+    start, stop, least = ends[:, 0].min(), ends[:, 1].max(), (1.0 + BOUND_MARGIN) * 2.0 * up[:, 0].max()
+    near, count = np.empty(bins, np.int64), 0
+    for i in range(bins):
+        nearest, farthest, lowest, first, last = np.inf, 0.0, np.inf, np.inf, -np.inf
+        for q in range(s.shape[1]):
+            nearest, farthest = min(nearest, abs(lateral[i, q])), max(farthest, abs(lateral[i, q]))
+            lowest = min(lowest, bend[i, q], bend_along[i, q])
+            first, last = min(first, s[i, q]), max(last, s[i, q])
+        swayed, turned = 0.0, 0.0
+        for m in range(modes):
+            sway, turn = 0.0, 0.0
+            for q in range(s.shape[1]):
+                sway, turn = max(sway, abs(basis[0, m, i, q])), max(turn, abs(basis[1, m, i, q]))
+            swayed, turned = swayed + most[m] * sway, turned + most[m] * turn
+        beyond = max(start - last, first - stop) - turned * (farthest + swayed) - flank
+        gap = max((nearest - swayed) / np.sqrt(1.0 + turned * turned) - foot, beyond)
+        # the ball over a plane, at most, that is felt as the tip is over the base
+        near[count] = i
+        count += 0 if gap > 0.0 and gap * gap > least * radius / max(1.0 + radius * lowest, 1e-3) else 1
+    return near[:count]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _about_top(bend, bend_along, ends, top, rounded, radius, place, aside, stretch):  # type: ignore[no-untyped-def]
+    """Distances (N,) across the section of nodes about a course, m, for their `aside`, and for their `stretch` radii of
+    the balls over a plane that are felt as the tip is there, m."""
+    start, stop, core = ends[0], ends[1], top - rounded
+    for j in range(len(place)):
+        around = stretch[j] * max(start - place[j], place[j] - stop) + rounded
+        beside = abs(aside[j])
+        # the distance of a rectangle that is smaller by the corners' radius all round
+        side = max(beside - core, 0.0)
+        away = np.sqrt(around * around + side * side)
+        share = around / away
+        bent = bend[j] + share * share * (bend_along[j] - bend[j])
+        aside[j] = core + away if around > 0.0 else beside
+        stretch[j] = radius / max(1.0 + radius * (bent if around > 0.0 else bend[j]), 1e-3)

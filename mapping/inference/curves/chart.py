@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import CourseError, FloatArray, IntArray
+from mapping import CourseError, FloatArray, IntArray, lengths
 from mapping.base import Base, between_walls, onto_base
 from mapping.inference.curves.body_edge import Wall, up_to_edges
 
@@ -87,7 +87,7 @@ class Chart:
     def _on_leg(self, points: FloatArray, leg: IntArray) -> tuple[FloatArray, FloatArray]:
         offset = points - self.points[leg]
         along = self.points[leg + 1] - self.points[leg]
-        length = np.linalg.norm(along, axis=1)
+        length = lengths(along)
         forward = np.einsum("ij,ij->i", offset, along) / np.maximum(length, np.finfo(float).tiny)
         lateral = np.einsum("ij,ij->i", offset, self.laterals[leg])
         s = self.s[leg] + forward * (self.s[leg + 1] - self.s[leg]) / np.maximum(length, np.finfo(float).tiny)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapping import CourseError, FloatArray
+from mapping import CourseError, FloatArray, lengths
 
 # Two half circles that meet in an S lie off their best polynomials by 4.7 % of their radius at degree 8, by 0.9 % at
 # 16; a course takes a degree only where it pays for itself
@@ -76,7 +76,7 @@ def _fit(axis: FloatArray, places: FloatArray, degree: int, closed: bool, sd: fl
         root = np.sqrt(weight)[:, None]
         coefficients = np.linalg.lstsq(root * design, root * axis, rcond=None)[0]
         velocity = (_design(places + 1e-5, degree, closed) - _design(places - 1e-5, degree, closed)) @ coefficients
-        speed = np.maximum(np.linalg.norm(velocity, axis=1) / 2e-5, np.finfo(float).tiny)
+        speed = np.maximum(lengths(velocity) / 2e-5, np.finfo(float).tiny)
         tangent = velocity / (2e-5 * speed[:, None])
         residual = axis - design @ coefficients
         along = np.einsum("ij,ij->i", residual, tangent)

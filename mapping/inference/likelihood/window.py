@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping import BoolArray, EmptyWindowError, FloatArray, IntArray, Trace
+from mapping import BoolArray, EmptyWindowError, FloatArray, IntArray, Trace, sides_of_box
 from mapping.base import Base, Feet, LaidTrace, on_walls, over_levels
 from mapping.instrument import Levels
 
@@ -158,7 +158,7 @@ def gather(trace: Trace, base: Base, points: FloatArray, normals: FloatArray, re
 def _on_one_plane(feet: Feet, base: Base) -> bool:
     normals = base.surface.face_normals[np.unique(feet.face)]
     turned = float(np.ptp(normals, axis=0).max())
-    off, reach = np.ptp((feet.points - feet.points[0]) @ normals[0]), np.ptp(feet.points, axis=0).max()
+    off, reach = np.ptp((feet.points - feet.points[0]) @ normals[0]), sides_of_box(feet.points).max()
     return bool(turned <= PLANE_ROUNDING and off <= PLANE_ROUNDING * reach)
 
 
@@ -330,7 +330,7 @@ def _join(runs: list[Window]) -> Window:
 def distance_along(points: FloatArray, noise_level: float) -> FloatArray:
     """(N,) distance travelled along one run, from means of blocks so long that noise cannot lengthen it."""
     count = len(points)
-    chord = float(np.linalg.norm(np.ptp(points, axis=0)))
+    chord = float(np.linalg.norm(sides_of_box(points)))
     blocks = count
     if noise_level > 0.0:
         blocks = int((chord * np.sqrt(count) / (5.0 * noise_level)) ** (2.0 / 3.0))

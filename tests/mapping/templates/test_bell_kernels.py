@@ -7,6 +7,7 @@ import pytest
 
 from mapping import FloatArray
 from mapping.geometry.templates import bell_heights
+from mapping.geometry.templates.bell_kernels import SLIGHT, _place_anywhere
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -83,3 +84,12 @@ def test_over_a_leaning_facet_the_ball_rises_along_its_normal() -> None:
     place, way = np.array([[foot[0], 0.0, foot[1]]]), np.array([[normal[0], 0.0, normal[1]]])
     bell_heights(place[:, None], way, np.zeros((1, 3)), UP[None], 0.0, *section, 1.0, out)
     assert out[0, 0] == pytest.approx(expected, abs=1e-4 * height)
+
+
+@pytest.mark.parametrize("curvature", [-3.0, 0.5])
+def test_places_along_a_ball_are_exact_however_far_round_it(curvature: float) -> None:
+    """Where the series stands for the arc tangent, where it ends, and beyond."""
+    for tangent in (1e-9, 0.01, 0.1, 0.999 * SLIGHT, 1.001 * SLIGHT, 1.0):
+        aside = tangent / abs(curvature)
+        expected = np.arctan(tangent) / abs(curvature)
+        assert _place_anywhere(0.0, aside * aside, curvature) == pytest.approx(expected, rel=2e-15, abs=0.0)

@@ -157,3 +157,22 @@ def test_round_edges_are_felt_as_the_arcs_that_they_are(shoulder: float, tip: fl
     rest = np.where(np.abs(gap) < tip, up + np.sqrt(np.maximum(tip**2 - gap**2, 0.0)) - tip, 0.0).max(axis=1)
     felt = trace(u, np.full_like(u, -0.5), [(0.5e-3, 0.4e-3)], tip, shoulder=shoulder)
     np.testing.assert_allclose(felt, np.maximum(rest, 0.0), atol=1e-9)
+
+
+def test_lines_of_a_batch_are_felt_as_each_alone_to_the_last_bit() -> None:
+    """Bins that none of a batch reaches are left out of it: one line far aside must not take another's."""
+    rng, count = np.random.default_rng(7), 400
+    s, lateral = np.sort(rng.uniform(-10e-3, 10e-3, (count, 2)), axis=0), rng.uniform(-8e-3, 8e-3, (count, 2))
+    basis = np.stack([np.stack([np.ones_like(s), s]), np.stack([np.zeros_like(s), np.ones_like(s)])])
+    bends = np.full((2, count, 2), 5.0)
+    courses = np.array([[0.0, 0.1], [5e-3, -0.2], [-6e-3, 0.0]])
+    ends = np.array([[-5e-3, 5e-3], [-9e-3, 0.0], [2e-3, 8e-3]])
+    half, height = np.array([0.5e-3, 0.0, 1e-3]), np.array([0.3e-3, 0.5e-3, 0.1e-3])
+    section = 0.5 * half, np.stack([half, half + 0.4e-3], axis=1), np.stack([height, np.zeros(3)], axis=1), 0.1 * height
+    together, alone = np.empty((3, count)), np.empty((3, count))
+    section_heights(s, lateral, basis, *bends, courses, ends, *section, 4e-3, together)
+    for w in range(3):
+        own = (each[w : w + 1] for each in (courses, ends, *section))
+        section_heights(s, lateral, basis, *bends, *own, 4e-3, alone[w : w + 1])
+    assert np.array_equal(together, alone)
+    assert ((together > 0.0).sum(axis=1) > 20).all()
