@@ -36,7 +36,11 @@ if TYPE_CHECKING:
         StandardHeight as StandardHeight,
         standard_heights as standard_heights,
     )
-    from explore3d.analysis.surface_account import SurfaceAccount as SurfaceAccount, swept_share as swept_share
+    from explore3d.analysis.surface_account import (
+        SurfaceAccount as SurfaceAccount,
+        swept_share as swept_share,
+        unmodelled_share as unmodelled_share,
+    )
     from explore3d.analysis.truth import Comparison as Comparison, TrueFeature as TrueFeature, compare as compare
 
 _PUBLIC = {
@@ -51,7 +55,7 @@ _PUBLIC = {
     "savings": ("without_needless_dynamics",),
     "stages": ("FINGER_STAGE", "Progress", "Stages", "silent"),
     "standard_heights": ("STANDARDS_SENTENCE", "StandardHeight", "standard_heights"),
-    "surface_account": ("SurfaceAccount", "swept_share"),
+    "surface_account": ("SurfaceAccount", "swept_share", "unmodelled_share"),
     "truth": ("Comparison", "TrueFeature", "compare"),
 }
 doorway(__name__, _PUBLIC)

@@ -34,6 +34,9 @@ OUT_OF_REGION = "what is found is followed to its ends, and ways lead round the 
 # What lies no further outside of a region than so many tip radii was touched from inside: sweeps are pressed on its
 # border, and a ball that rolls over an edge there touches beside it
 REGION_BORDER = 0.1
+# A ball that rests on the body's border, or rolls off it, is no further from the base than its radius, and one on a
+# fine feature than that and its height: one further off than its own diameter more touches what the base does not have
+OFF_BASE = 2.0
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,8 @@ class SurfaceAccount:
         unseen_path: length of sweeps too short, or of too few samples, for anything to be seen on them, m: what only
             they touched was not swept.
         below: share of the area that faces down; 0 where the scene names the sides that are explored.
+        unmodelled: least share of a body without a mesh that lies off the base that was found (`unmodelled_share`).
+        base_kind: of that base.
     """
 
     area: float
@@ -82,6 +87,8 @@ class SurfaceAccount:
     below: float = 0.0
     hidden: float | None = None
     hidden_groove: float | None = None
+    unmodelled: float = 0.0
+    base_kind: str = ""
 
     @classmethod
     def of_log(
@@ -123,6 +130,8 @@ class SurfaceAccount:
             causes=_causes([str(d["what"]) for d in refused]),
             shortest_ridge=scene.survey.shortest_ridge,
             is_plan=False,
+            unmodelled=unmodelled_share(log.trace, base) if scene.model.mesh is None else 0.0,
+            base_kind=base.kind,
         )
 
     @classmethod
@@ -173,7 +182,7 @@ class SurfaceAccount:
     @property
     def short(self) -> bool:
         """True if so much is missing that the run did not do what it was asked for."""
-        return self.shortest_ridge is None and self.unswept > MOST_UNSWEPT
+        return (self.shortest_ridge is None and self.unswept > MOST_UNSWEPT) or self.unmodelled > MOST_UNSWEPT
 
     def record(self) -> dict[str, Any]:
         """JSON values, SI units."""
@@ -181,10 +190,17 @@ class SurfaceAccount:
         names += ["swept_path", "other_path", "refused_path", "moves"]
         causes = [{"why": why, "moves": count} for why, count in self.causes]
         names += [] if self.touched_beyond is None else ["touched_beyond", "ways_beyond"]
+        names += ["unmodelled"] if self.unmodelled else []
         return {name: getattr(self, name) for name in names} | {"unswept": self.unswept, "causes": causes}
 
     def warning(self) -> str:
         """The first thing to say where too much is missing, or where noise hides what was asked for, else ""."""
+        if self.unmodelled > MOST_UNSWEPT:
+            return (
+                f"NOT INSPECTED: {100 * self.unmodelled:.0f} % of the body that was felt, or more, lies off the "
+                f"{self.base_kind} that was found: its form there is not known, and nothing was looked for. Needed is "
+                "a mesh, or a region without that part."
+            )
         if not self.short:
             if self.hidden is None or self.shortest_ridge is not None:
                 return ""
@@ -289,6 +305,24 @@ def _shares(
         "not_inspected": max(0.0, missed - refused_share - unreachable),
         "below": below,
     }
+
+
+def unmodelled_share(trace: Trace, base: Base) -> float:
+    """Least share of a felt body that lies off its base: of the boxes a tip's diameter wide in which the ball was.
+
+    What lies on the base is swept again and again, and the rest crossed by the first lines alone: not all boxes of that
+    are known, but none counts twice.
+
+    Args:
+        trace: all that was felt, also while the base was not known.
+        base: as found.
+    """
+    tip = trace.tip_radius
+    _, box = np.unique(np.floor(trace.centers / (2.0 * tip)), axis=0, return_inverse=True)
+    off = base.nearest.query(trace.centers).distance > (1.0 + OFF_BASE) * tip
+    if not len(off):
+        return 0.0
+    return float((np.bincount(box.ravel(), off) > 0.5 * np.bincount(box.ravel())).mean())
 
 
 def _beyond(scene: Scene, touched: FloatArray, ways: Sequence[FloatArray]) -> dict[str, Any]:

@@ -82,8 +82,8 @@ class EndFinder:
             return end
         last = float(about.along[-1]) - 0.5 * half
         fit = self._fitted(felt, about, crest, last)
-        place = fit.place - float(about.along[0])
-        if not 0.02 * tip < place < last - 0.02 * tip or fit.sd > 0.2 * tip or abs(fit.height) < 0.4 * crest.height:
+        inside = float(about.along[0]) + 0.02 * tip < fit.place < last - 0.02 * tip
+        if not inside or fit.sd > 0.2 * tip or abs(fit.height) < 0.4 * crest.height:
             return replace(end, sd=max(end.reach, 0.1 * tip), reason="lost")
         where, heading = about.at(fit.place)
         # what follows starts from the end: it must follow the same curve

@@ -108,7 +108,7 @@ class RidgeFollower:
             lowest = STILL_HIGH * line.height
             heading = walk.directions[-1] if len(line.crossings) % 2 else -walk.directions[-1]
             found = yield from self._cross(walk.points[-1], heading, last, sign, reach, lowest)
-            if found is None:
+            if found is None or np.linalg.norm(found.point - last.point) < 0.5 * walk.along[-1]:  # the last one again
                 gone, empty = float(walk.along[-1]), walk.points[-1]
                 if len(line.crossings) < WELL_KNOWN:
                     del brackets[:-1]

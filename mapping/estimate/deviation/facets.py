@@ -35,6 +35,9 @@ BLOCKS_PER_FACET = 4
 # nothing scatters
 LEFT_FLAT, LEFT_OF_BULGE = 0.1, 1e-4
 
+# Places on a side of a facet have a coordinate below this
+OVER_A_SIDE = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class RoundedOut:
@@ -52,7 +55,7 @@ class RoundedOut:
 
 
 @dataclass(frozen=True, eq=False)
-class _Facets:
+class Facets:
     """Triangles with the normals of the body at their corners.
 
     Args:
@@ -68,7 +71,7 @@ class _Facets:
     origin: IntArray
 
     @classmethod
-    def of(cls, base: Base, face: IntArray) -> _Facets:
+    def of(cls, base: Base, face: IntArray) -> Facets:
         """Some faces of a mesh (F,)."""
         return cls(base.surface.vertices, base.surface.faces[face], base.nearest.corner_normals(face), face)
 
@@ -76,7 +79,50 @@ class _Facets:
         """(F, 3) height of the body over the middle of the side from each corner to the next, m; negative: below."""
         return side_bulges(self.vertices[self.faces], self.normals)
 
-    def halved(self, bulges: FloatArray, tolerance: float) -> _Facets | None:
+    def distance(self, centers: FloatArray, face: IntArray, feet: FloatArray) -> FloatArray:
+        """(N,) signed distance of places from the body over the facets that they are nearest to, m.
+
+        Over a facet the body is a quadratic, B = sum of 4 b_i b_j bulge_ij for coordinates b, and so beyond its sides:
+        its foot is one Newton step of the squared distance away from the facet's. Over a side the direction to a place
+        leans from the body's normal no more than the facets there do, unless it is an edge of the body: there it stays.
+
+        Args:
+            centers: (N, 3) m.
+            face: (N,) nearest facet of each.
+            feet: (N, 3) coordinates of its place there.
+        """
+        corners, normals = self.vertices[self.faces[face]], self.normals[face]
+        bulge = side_bulges(corners, normals)
+        one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        flat = unit_vectors(np.cross(one, other))
+        up = centers - np.einsum("nc,ncx->nx", feet, corners)
+        height = np.einsum("nx,nx->n", up, flat)
+        left = height - _over(feet, bulge)
+        slope = 4.0 * (feet[:, [1, 2, 0]] * bulge + (feet * bulge)[:, [2, 0, 1]])  # of B, by each coordinate
+        steep = slope[:, 1:] - slope[:, :1]
+        sides = np.stack([one, other], axis=1)
+        downhill = np.einsum("nkx,nx->nk", sides, up - height[:, None] * flat) + left[:, None] * steep
+        first, second, third = bulge.T
+        bend = np.array([[-2.0 * first, second - first - third], [second - first - third, -2.0 * third]])
+        curved = np.einsum("nkx,nlx->nkl", sides, sides) + steep[:, :, None] * steep[:, None]
+        curved -= 4.0 * left[:, None, None] * bend.transpose(2, 0, 1)
+        (a, b), d = curved[:, 0].T, curved[:, 1, 1]
+        determinant = a * d - b * b
+        safe = np.where(determinant > 0.0, determinant, np.inf)
+        step = np.stack([d * downhill[:, 0] - b * downhill[:, 1], a * downhill[:, 1] - b * downhill[:, 0]]) / safe
+        step = np.column_stack([-step[0] - step[1], step[0], step[1]])
+        smooth = unit_vectors(np.einsum("nc,ncx->nx", feet, normals))
+        # 1 - cos, which goes with the square of what they lean
+        leans, own = (1.0 - np.abs(np.einsum("nx,nx->n", smooth, each)) for each in (unit_vectors(up), flat))
+        stays = (feet.min(axis=1) <= OVER_A_SIDE) & (leans > ALIKE_BULGES**2 * own)
+        # where the body is as hollow as the ball is round, its foot may be anywhere
+        stays |= (np.abs(step) > 1.0).any(axis=1)
+        there = feet + np.where(stays[:, None], 0.0, step)
+        smooth = unit_vectors(np.einsum("nc,ncx->nx", there, normals))
+        on_body = np.einsum("nc,ncx->nx", there, corners) + _over(there, bulge)[:, None] * smooth
+        return np.asarray(np.where(left < 0.0, -1.0, 1.0) * np.linalg.norm(centers - on_body, axis=1))
+
+    def halved(self, bulges: FloatArray, tolerance: float) -> Facets | None:
         """Each side that the body stands off by more than a tolerance (m) cut in two at the body; None if none does.
 
         A side is cut alike for both of its faces, where the one that bulges more says: no gap opens.
@@ -102,7 +148,7 @@ class _Facets:
         amid = new[number].reshape(-1, 3)
         return self._pieces(vertices, amid)
 
-    def _pieces(self, vertices: FloatArray, amid: IntArray) -> _Facets:
+    def _pieces(self, vertices: FloatArray, amid: IntArray) -> Facets:
         """The faces cut at the new vertices amid their sides (F, 3), -1 where there is none."""
         count = (amid >= 0).sum(axis=1)
         # turned so that of one cut side it is the first, and of two the first two
@@ -126,9 +172,9 @@ class _Facets:
                 faces.append(names[own][:, piece])
                 kept.append(told[own][:, piece])
                 origin.append(self.origin[own])
-        return _Facets(vertices, np.concatenate(faces), np.concatenate(kept), np.concatenate(origin))
+        return Facets(vertices, np.concatenate(faces), np.concatenate(kept), np.concatenate(origin))
 
-    def rounded(self, round_: BoolArray, tolerance: float) -> _Facets:
+    def rounded(self, round_: BoolArray, tolerance: float) -> Facets:
         """With the pieces of the mesh's faces that are round (F,) cut until they lie on the body to a tolerance, m."""
         now = self
         while len(now.faces) <= MOST_REFINED_FACES // 4:
@@ -152,13 +198,11 @@ def round_out(trace: Trace, base: Base) -> RoundedOut | None:
     if not len(felt):
         return None
     scatter = heights.scatter(heights.height, trace.tip_radius)
-    if np.abs(_Facets.of(base, felt).bulges()).max() < NOT_SEEN * scatter:
+    if np.abs(Facets.of(base, felt).bulges()).max() < NOT_SEEN * scatter:
         return None
-    patch, facets = _patches(base.surface, _Facets.of(base, np.arange(len(base.surface.faces))))
+    patch, facets = _patches(base.surface, Facets.of(base, np.arange(len(base.surface.faces))))
     most = np.abs(facets.bulges()).max(axis=1)
-    tried = np.isin(patch, np.unique(patch[felt]))
-    round_all = facets.rounded(tried, max(LEFT_FLAT * scatter, LEFT_OF_BULGE * float(most[felt].max())))
-    over = heights.over(_with(base, round_all), trace.tip_radius)
+    over = heights.over(facets, trace.tip_radius, base.offset)
     scatter = min(scatter, heights.scatter(over, trace.tip_radius))
     gains = heights.gains(over, scatter, patch)
     told = np.array([number for number, gain in gains.items() if gain > LEAST_GAIN], dtype=np.int64)
@@ -167,7 +211,8 @@ def round_out(trace: Trace, base: Base) -> RoundedOut | None:
     chosen = np.isin(patch, told)
     bulge = float(most[felt][chosen[felt]].max())
     rounded = facets.rounded(chosen, max(LEFT_FLAT * scatter, LEFT_OF_BULGE * bulge))
-    return RoundedOut(_with(base, rounded), bulge, float(sum(gains[int(number)] for number in told)))
+    finer = replace(base, surface=Surface(rounded.vertices, rounded.faces))
+    return RoundedOut(finer, bulge, float(sum(gains[int(number)] for number in told)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,6 +221,8 @@ class _Heights:
 
     Args:
         centers: (N, 3) of the samples, m.
+        under: (N,) face of the mesh under each.
+        barycentric: (N, 3) where on that.
         size: samples in a block.
         height: (B,) m.
         face: (B,) of the mesh under their middles.
@@ -183,6 +230,8 @@ class _Heights:
     """
 
     centers: FloatArray
+    under: IntArray
+    barycentric: FloatArray
     size: int
     height: FloatArray
     face: IntArray
@@ -202,11 +251,28 @@ class _Heights:
         number = np.repeat(np.arange(len(feet)), [len(each) for each in height])
         each = zip(laid.laid_sweeps, parts, whole, strict=True)
         centers = [sweep.trace.centers[part][:n] for sweep, part, n in each]
-        return cls(np.concatenate(centers), size, np.concatenate(height), np.concatenate(face), np.diff(number) == 0)
+        under, barycentric = (
+            np.concatenate([getattr(one, name)[:n] for one, n in zip(feet, whole, strict=True)])
+            for name in ("face", "barycentric")
+        )
+        return cls(
+            np.concatenate(centers),
+            under,
+            barycentric,
+            size,
+            np.concatenate(height),
+            np.concatenate(face),
+            np.diff(number) == 0,
+        )
 
-    def over(self, base: Base, tip_radius: float) -> FloatArray:
-        """(B,) over another base, m."""
-        return np.asarray(base.foot(self.centers, tip_radius).height.reshape(-1, self.size).mean(axis=1))
+    def over(self, facets: Facets, tip_radius: float, offset: float) -> FloatArray:
+        """(B,) over the body that the facets stand for, m.
+
+        Args:
+            offset: of the base, m.
+        """
+        distance = facets.distance(self.centers, self.under, self.barycentric)
+        return np.asarray((distance - tip_radius - offset).reshape(-1, self.size).mean(axis=1))
 
     def scatter(self, height: FloatArray, tip_radius: float) -> float:
         """Of the differences of neighbouring blocks' heights (B,), m."""
@@ -227,7 +293,12 @@ class _Heights:
         return dict(zip(numbers.tolist(), np.bincount(index, gain).tolist(), strict=True))
 
 
-def _patches(surface: Surface, facets: _Facets) -> tuple[IntArray, _Facets]:
+def _over(places: FloatArray, bulges: FloatArray) -> FloatArray:
+    """(N,) height of a body over facets at coordinates (N, 3), m, by its bulges over their sides (N, 3)."""
+    return 4.0 * np.asarray(np.einsum("nc,nc,nc->n", places, places[:, [1, 2, 0]], bulges))
+
+
+def _patches(surface: Surface, facets: Facets) -> tuple[IntArray, Facets]:
     """(F,) number of the patch of each face, and the facets with the normals that the body has at the patches' borders.
 
     Neighbours belong together that bulge alike without a crease between them. At a border the mean of the faces leans
@@ -254,7 +325,3 @@ def _patches(surface: Surface, facets: _Facets) -> tuple[IntArray, _Facets]:
     turned = at_border & ~at_border.all(axis=1, keepdims=True)
     normals = np.where(turned[:, :, None], unit_vectors(across)[:, None], facets.normals)
     return patch, replace(facets, normals=normals)
-
-
-def _with(base: Base, facets: _Facets) -> Base:
-    return replace(base, surface=Surface(facets.vertices, facets.faces))

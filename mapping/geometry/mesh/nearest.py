@@ -103,8 +103,9 @@ class NearestPoint:
     def edge_normals(self) -> FloatArray:
         """(F, 3, 3): of the edge opposite to each corner, the mean normal of the faces that share it."""
         faces = self.surface.faces
-        edges = np.sort(np.stack([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]], axis=1), axis=2)
-        _, name = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+        one, other = faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]
+        sides = np.minimum(one, other) * len(self.surface.vertices) + np.maximum(one, other)
+        _, name = np.unique(sides, return_inverse=True)
         sums = np.zeros((int(name.max()) + 1, 3))
         np.add.at(sums, name.ravel(), np.repeat(self.surface.face_normals, 3, axis=0))
         return unit_vectors(sums)[name.ravel()].reshape(-1, 3, 3)

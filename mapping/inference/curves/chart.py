@@ -13,6 +13,9 @@ from mapping import CourseError, FloatArray, IntArray, lengths
 from mapping.base import Base, between_walls, onto_base
 from mapping.inference.curves.body_edge import Wall, up_to_edges
 
+# Legs longer than this, in tip radii, are asked in between where a wall begins: a ball feels one from a radius away on
+ASKED_WALL = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class Chart:
@@ -127,8 +130,7 @@ def chart_along(
         line, lift = _extended(line, lift, spacing, extension)
     walls: tuple[Wall, Wall] = (None, None)
     if not closed:
-        reached = between_walls(line, lift, base, tip_radius)
-        on_face = up_to_edges(line[reached], lift[reached], base, tip_radius)
+        on_face = up_to_edges(*_short_of_walls(line, lift, base, tip_radius), base, tip_radius)
         line, lift, walls = on_face.line, on_face.lift, on_face.walls
     points, up = onto_base(line, lift, base, tip_radius, smooth=int(0.5 * reach / spacing))
     if not closed:
@@ -174,6 +176,26 @@ def _extended(line: FloatArray, lift: FloatArray, spacing: float, extension: flo
     behind = line[-1] + far * ahead / np.linalg.norm(ahead)
     lifts = [np.repeat(lift[:1], count, axis=0), lift, np.repeat(lift[-1:], count, axis=0)]
     return np.concatenate([before, line, behind]), np.concatenate(lifts)
+
+
+def _short_of_walls(line: FloatArray, lift: FloatArray, base: Base, tip_radius: float) -> tuple[FloatArray, FloatArray]:
+    """The line and its normals up to where it runs into walls, which legs longer than ASKED_WALL are asked for between
+    their ends: an extension may be a single one."""
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    legs = np.ceil(np.diff(s) / (ASKED_WALL * tip_radius)).astype(int)
+    shares = np.concatenate([np.arange(count) / max(count, 1) for count in legs])
+    asked = np.append(np.repeat(s[:-1], legs) + shares * np.repeat(np.diff(s), legs), s[-1])
+    reached = asked[between_walls(*_at_places(asked, s, line, lift), base, tip_radius)]
+    if len(reached) == len(asked):
+        return line, lift
+    inner = s[(s > reached[0]) & (s < reached[-1])]
+    return _at_places(np.concatenate([reached[:1], inner, reached[-1:]]), s, line, lift)
+
+
+def _at_places(places: FloatArray, s: FloatArray, line: FloatArray, lift: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points (N, 3) and unit normals (N, 3) at arclengths (N,) of a line with arclengths s (K,)."""
+    points, up = (np.column_stack([np.interp(places, s, of[:, i]) for i in range(3)]) for of in (line, lift))
+    return points, up / np.linalg.norm(up, axis=1, keepdims=True)
 
 
 def _on_base(moved: FloatArray, up: FloatArray, tolerance: float) -> slice:

@@ -53,6 +53,13 @@ def test_a_slide_finds_the_end_as_near_as_its_standard_deviation_says() -> None:
     assert abs(np.mean(scores)) < 0.9 and 0.45 < np.std(scores) < 1.65
 
 
+def test_a_slide_finds_an_end_beyond_where_crossings_bracketed_it() -> None:
+    """As that of a groove, whose edge lifts the ball half a disturbance before: no slide of one was believed."""
+    rough = AxisEnd(END - [4e-3, 0.0, 0.0], np.inf, "end", WAY, reach=2e-3)
+    end, _ = found(rough, seed=1, slides=True)
+    assert end.reason == "end" and abs(end.point[0] - END[0]) < 4.0 * end.sd
+
+
 def test_sweeps_across_tell_the_end_along_the_line_and_across_as_well_as_asked() -> None:
     scores = []
     for seed in range(8):

@@ -8,7 +8,7 @@ import pytest
 from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.estimate.deviation import explain
-from mapping.estimate.deviation.facets import round_out
+from mapping.estimate.deviation.facets import Facets, round_out
 from mapping.geometry.contact import BallContact
 from mapping.surface import Surface
 from mapping.trace import Trace
@@ -108,3 +108,35 @@ def test_a_flat_beside_what_is_round_stays_flat() -> None:
     assert before[top].std() > 10.0 * NOISE
     # as much where both meet
     assert left[flat].std() < 1.5 * NOISE and left[~flat].std() < 1.5 * NOISE and np.abs(left).max() < 6.0 * NOISE
+
+
+@pytest.mark.parametrize("radius", [1e-3, 5e-3, 30e-3])
+@pytest.mark.parametrize("hollow", [False, True])
+def test_the_body_over_facets_of_a_ball_is_the_ball(radius: float, hollow: bool) -> None:
+    """Felt from outside and, where the fingertip fits in, from inside: to a hundredth of what the facets are off."""
+    import trimesh
+
+    if hollow and radius < TIP:
+        return
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=radius)
+    base = Base(Surface(ball.vertices, ball.faces[:, ::-1] if hollow else ball.faces))
+    towards = np.random.default_rng(1).standard_normal((4000, 3))
+    reach = radius - TIP if hollow else radius + TIP
+    centers = reach * towards / np.linalg.norm(towards, axis=1, keepdims=True)
+    feet = base.foot(centers, TIP)
+    body = Facets.of(base, np.arange(len(ball.faces)))
+    over = body.distance(centers, feet.face, feet.barycentric) - TIP
+    assert np.abs(over).max() < 0.02 * np.abs(feet.height).max()
+
+
+def test_over_edges_of_a_block_the_body_is_the_block() -> None:
+    block = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    import trimesh
+
+    hull = trimesh.convex.convex_hull(0.01 * block)
+    base = Base(Surface(hull.vertices, hull.faces))
+    towards = np.random.default_rng(1).standard_normal((2000, 3))
+    centers = 0.03 * towards / np.linalg.norm(towards, axis=1, keepdims=True)
+    near = base.nearest.query(centers)
+    body = Facets.of(base, np.arange(len(hull.faces)))
+    np.testing.assert_allclose(body.distance(centers, near.face, near.barycentric), near.distance, atol=1e-15)

@@ -36,6 +36,18 @@ def test_a_chart_ends_where_the_base_does_and_its_points_stay_apart() -> None:
     assert (np.diff(chart.s) > 0).all() and np.isfinite(chart.tangents).all()
 
 
+def test_a_straight_line_goes_on_to_where_a_wall_begins() -> None:
+    """Its extension is one leg, which ends in the wall: without it the line's own ends would be the last ones tried."""
+    floor = 0.03 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    top = floor[1:3] + np.array([0.0, 0.0, 0.03])
+    base = Base(Surface(np.concatenate([floor, top]), [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]]))
+    axis = np.array([[-0.012, 0.0, 0.0], [0.012, 0.0, 0.0]])
+    chart = chart_along(axis, np.tile(UP, (2, 1)), base, TIP, 0.05, 0.017, 3.6e-3)
+    assert chart.points[0, 0] == pytest.approx(-0.029)
+    # the ball touches the wall from 0.02 on
+    assert 0.015 < chart.points[-1, 0] < 0.0201
+
+
 def test_a_line_that_does_not_lie_over_the_base_has_none() -> None:
     axis = np.linspace([0.05, 0.05, 0.0], [0.06, 0.06, 0.0], 5)
     with pytest.raises(EmptyWindowError, match="does not lie over the base"):
