@@ -17,6 +17,10 @@ from mapping.inference.likelihood import LogPosterior, Prior, Shape
 # Places along a line at which it is asked on which side of a step it lies; between two of them the side changes where
 # a straight line says
 PLACES_OF_LINE = 65
+# By a power of that (m) crests are raised beside hollows: 4 % more than a row asks for, at most. Were it by just that,
+# every row of a difference quotient would ask for crests of its own; by what most rows ask for, a row would depend on
+# others
+RAISED_BY = 2.0 ** (1 / 16)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +76,9 @@ class JoinedShape:
         theta = np.hstack([theta, np.tile(self.theirs, (len(theta), 1))]) if self.held else theta
         own = [theta[:, columns] for columns in _in_a_row(self._all)]
         hollows = [_Distinct.of(self._all[k].templates, own[k]) for k in self._varied if not stands_out(self._all[k])]
-        ground = sum((each.heights[0] for each in hollows), self._held_ground)
-        felt = np.tile(ground, (len(theta), 1))
+        felt = np.tile(self._held_ground, (len(theta), 1))
         for hollow in hollows:
-            felt[hollow.other] += hollow.heights[hollow.which[hollow.other]] - hollow.heights[0]
+            felt += hollow.heights[hollow.which]
         if self._crossing is not None:
             crossed = _Distinct.of(self._crossed, np.hstack([own[k] for k in self._grooves]))
             felt += crossed.heights[crossed.which]
@@ -83,11 +86,14 @@ class JoinedShape:
             beside = _Distinct.of(rims.heights, np.hstack([own[groove], own[edge]]))
             felt += beside.heights[beside.which]
         # a crest beside a hollow holds the ball that sinks into it: crests are known as far down as it does
-        sunk = max(-float(felt.min(initial=0.0)), 0.0)
+        deep = np.maximum(-felt.min(axis=1, initial=0.0), 0.0)
+        powers = np.ceil(np.log(np.maximum(deep, np.finfo(float).tiny)) / np.log(RAISED_BY))
+        sunk = np.where(deep > 0.0, RAISED_BY**powers, 0.0)
         every = ((self._all[k], piece) for k in self._varied for piece in self._crests(k, own, sunk))
-        crests = [_Distinct.of(shape.templates, piece) for shape, piece in every]
-        crests += [_Distinct.same(heights, len(theta)) for heights in self._held_crests(own, sunk)]
-        _rest_on(felt, crests, sunk)
+        crests = [_lowered(shape.templates, piece, sunk) for shape, piece in every]
+        if self._has_held_crests:
+            crests.append(_Distinct.of(lambda rows: self._held_crests(own, rows[:, 0]), sunk[:, None]))
+        _rest_on(felt, crests)
         # part by part: numpy's mean over so short an axis takes four times as long
         return np.asarray(sum(felt[:, part :: self.fine] for part in range(self.fine)) / self.fine)
 
@@ -135,25 +141,31 @@ class JoinedShape:
                 ground += self._all[k].templates(self.theirs[None, columns[k - len(self.shapes)]])[0]
         return ground
 
-    def _held_crests(self, own: Sequence[FloatArray], sunk: float) -> list[FloatArray]:
-        """Highest of the crests (fine * bins,) that do not vary, raised by `sunk`, m; none if there are none."""
-        if sunk not in self._raised_by:
-            one, numbers = [each[:1] for each in own], range(len(self._varied), len(self._all))
-            crests = [self._all[k].templates(piece)[0] for k in numbers for piece in self._crests(k, one, sunk)]
-            self._raised_by.clear()
-            self._raised_by[sunk] = [np.max(crests, axis=0)] if crests else []
-        return self._raised_by[sunk]
+    def _held_crests(self, own: Sequence[FloatArray], sunk: FloatArray) -> FloatArray:
+        """(M, fine * bins) highest of the crests that do not vary, known as far down as `sunk` (M,), m."""
+        one, numbers = [each[:1] for each in own], range(len(self._varied), len(self._all))
+        for each in set(sunk.tolist()) - set(self._raised_by):
+            crests = [
+                self._all[k].templates(piece)[0] for k in numbers for piece in self._crests(k, one, np.array([each]))
+            ]
+            self._raised_by[each] = np.max(crests, axis=0) - each
+        return np.array([self._raised_by[each] for each in sunk.tolist()])
 
     @cached_property
-    def _raised_by(self) -> dict[float, list[FloatArray]]:
+    def _has_held_crests(self) -> bool:
+        return any(stands_out(self._all[k]) for k in range(len(self._varied), len(self._all)))
+
+    @cached_property
+    def _raised_by(self) -> dict[float, FloatArray]:
         return {}
 
-    def _crests(self, k: int, own: Sequence[FloatArray], sunk: float) -> Iterator[FloatArray]:
-        """Parameters (W, P) of the k-th shape if it stands out, and of what of it stands on steps, raised by `sunk`."""
+    def _crests(self, k: int, own: Sequence[FloatArray], sunk: FloatArray) -> Iterator[FloatArray]:
+        """Parameters (W, P) of the k-th shape if it stands out, and of what of it stands on steps, raised by `sunk`
+        (W,), m."""
         shape = self._all[k]
         if not stands_out(shape):
             return
-        yield _raised(shape, own[k], np.full(len(own[k]), sunk))
+        yield _raised(shape, own[k], sunk)
         for piece, lift in self._on_steps(k, own):
             yield _raised(shape, piece, lift + sunk)
 
@@ -240,8 +252,14 @@ class _Distinct:
         return cls(heights[None], np.zeros(count, dtype=np.int64), np.zeros(0, dtype=np.int64))
 
 
-def _rest_on(felt: FloatArray, crests: Sequence[_Distinct], sunk: float) -> None:
-    """Raise ground (W, n) to the highest of crests that are `sunk` (m) too high."""
+def _lowered(templates: Callable[[FloatArray], FloatArray], theta: FloatArray, raised: FloatArray) -> _Distinct:
+    """Heights of a shape that was raised by (W,) m, where it belongs."""
+    rows = np.column_stack([theta, raised])
+    return _Distinct.of(lambda some: templates(np.ascontiguousarray(some[:, :-1])) - some[:, -1:], rows)
+
+
+def _rest_on(felt: FloatArray, crests: Sequence[_Distinct]) -> None:
+    """Raise ground (W, n) to the highest of crests."""
     if not crests:
         return
     commonest = np.array([each.heights[0] for each in crests])
@@ -261,9 +279,9 @@ def _rest_on(felt: FloatArray, crests: Sequence[_Distinct], sunk: float) -> None
             without[key] = np.where(where, second, highest)
             if len(own) > 1:
                 without[key][where] = np.delete(commonest, own, axis=0)[:, where].max(axis=0, initial=-np.inf)
-        np.maximum(felt[row], without[key] - sunk, out=felt[row])
+        np.maximum(felt[row], without[key], out=felt[row])
         for k in own:
-            np.maximum(felt[row], crests[k].heights[crests[k].which[row]] - sunk, out=felt[row])
+            np.maximum(felt[row], crests[k].heights[crests[k].which[row]], out=felt[row])
 
 
 def _first_above(s: FloatArray, values: FloatArray) -> FloatArray:

@@ -550,3 +550,20 @@ def test_a_roof_whose_gentle_flanks_are_touched_is_one_ridge() -> None:
     laid_trace = LaidTrace.of(trace, base)
     (ridge,) = assemble(detect(laid_trace, base), laid_trace, base)
     assert ridge.kind == "ridge"
+
+
+@pytest.mark.parametrize("body", ["burred groove", pytest.param("wire over a step", marks=pytest.mark.slow)])
+def test_what_a_row_leaves_depends_on_no_other_row(body: str) -> None:
+    """Batches are shared among cores: what is felt with one of them would be another thing with two."""
+    features = [_true(true) for true in classified_body(body, FIRST_BUILT_WITH).truth]
+    place = _weighed_on(body, features)
+    parts = [part_of(feature, place, 1) for feature in features]
+    step, rng = np.concatenate([part.shape.step for part in parts]), np.random.default_rng(0)
+    theta = np.concatenate([part.start for part in parts]) + 5.0 * step * rng.standard_normal((12, len(step)))
+    theta[::3] = theta[0]
+    joined_shape = JoinedShape([part.shape for part in parts], len(place.window), PARTS_OF_BIN)
+    held = JoinedShape([parts[0].shape], len(place.window), PARTS_OF_BIN, [part.shape for part in parts[1:]],
+                       np.concatenate([part.start for part in parts[1:]]))  # fmt: skip
+    for shape, rows in ((joined_shape, theta), (held, theta[:, : len(parts[0].start)])):
+        apart = np.concatenate([shape.templates(rows[k : k + 1]) for k in range(len(rows))])
+        np.testing.assert_array_equal(shape.templates(rows), apart)
