@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import BoolArray, Feature, FloatArray, IntArray, Interval, Trace
-from mapping.base import Base, LaidTrace, over_levels
+from mapping.base import Base, Feet, LaidTrace, over_levels
 from mapping.detection import Crossing
 from mapping.estimate.envelope import Estimate
 from mapping.estimate.sweeps import BRIDGED
@@ -21,6 +21,8 @@ SECTION_BINS = 60
 GRID = 241
 # Share of a feature's height that is not to be seen beside it: two pixels of a panel
 UNSEEN_SHARE = 0.01
+# Half-widths to either side that a section shows if one of the nearest sweeps does: both flanks end at one
+BOTH_SIDES, MOST_PASSAGES = 1.0, 8
 # Sine of the angle at which a sweep must cross a line to show its section: 30 degrees
 LEAST_SINE = 0.5
 # Half-widths, and standard deviations of places along the sweep, by which samples may go back before it has turned: not
@@ -69,7 +71,8 @@ def cross_section(
     estimate: Estimate | None = None,
     others: Sequence[Feature] = (),
 ) -> CrossSection | None:
-    """The section along the sweep that crosses nearest to the feature's middle; None if no sweep does.
+    """The section along the sweep that crosses nearest to the feature's middle, of a line one of those that show both
+    its sides if there are such; None if no sweep does.
 
     Args:
         feature: what was found.
@@ -79,19 +82,19 @@ def cross_section(
         estimate: the estimated surface of the same trace.
         others: features that the trace shows, too; the feature itself may be among them.
     """
-    crossing = _nearest_crossing(feature, trace.tip_radius, crossings)
-    window = _window(feature, crossing, trace)
-    if len(window) == 0:
+    laid, best = LaidTrace.of(trace, base), None
+    # over a point each sweep shows another height: that nearest to its middle tells most
+    most = MOST_PASSAGES if len(feature.axis) > 1 else 1
+    nearest: Sequence[Crossing | None] = _nearest_crossings(feature, trace.tip_radius, crossings)[:most]
+    for crossing in nearest or [None]:
+        own = _Passage.of(feature, crossing, laid)
+        if own is not None and (best is None or own.shown > best.shown):
+            best = own
+        if best is not None and best.shown >= BOTH_SIDES:
+            break
+    if best is None:
         return None
-    feet = LaidTrace.of(trace, base).feet(window)
-    half = max(half_width(feature, trace.tip_radius), 0.0 if crossing is None else crossing.half_width)
-    heading = _heading(feature, feet.points, half)
-    x, beside = _place(feature, feet.points, feet.normals, heading)
-    near = (np.abs(x) < SECTION_REACH * half) & (beside < half) & _one_way(x, beside, half)
-    index = np.flatnonzero(near)[np.argsort(x[near], kind="stable")]
-    if len(index) < 3:
-        return None
-    x = x[index]
+    window, feet, half, heading, index, x = best.window, best.feet, best.half, best.heading, best.index, best.x
     grid = np.linspace(x[0], x[-1], GRID)
     points, normals = (_interpolated(grid, x, getattr(feet, name)[index]) for name in ("points", "normals"))
     sizes = [feature.height.median, feature.height.low, feature.height.high]
@@ -121,6 +124,46 @@ def cross_section(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Passage:
+    """One sweep over a feature.
+
+    Args:
+        window: (W,) samples of the sweep about it.
+        feet: of these on the base.
+        half: half of the strip that the feature disturbs, m.
+        heading: of the sweep over a point; None over a line.
+        index: (N,) of the window: those that the section shows, in the order of x.
+        x: (N,) their distances from the crest, m.
+    """
+
+    window: IntArray
+    feet: Feet
+    half: float
+    heading: FloatArray | None
+    index: IntArray
+    x: FloatArray
+
+    @classmethod
+    def of(cls, feature: Feature, crossing: Crossing | None, trace: LaidTrace) -> _Passage | None:
+        """That about a crossing, or nearest to the middle; None if it has hardly a sample."""
+        window = _window(feature, crossing, trace)
+        if len(window) == 0:
+            return None
+        feet = trace.feet(window)
+        half = max(half_width(feature, trace.tip_radius), 0.0 if crossing is None else crossing.half_width)
+        heading = _heading(feature, feet.points, half)
+        x, beside = _place(feature, feet.points, feet.normals, heading)
+        near = (np.abs(x) < SECTION_REACH * half) & (beside < half) & _one_way(x, beside, half)
+        index = np.flatnonzero(near)[np.argsort(x[near], kind="stable")]
+        return None if len(index) < 3 else cls(window, feet, half, heading, index, x[index])
+
+    @property
+    def shown(self) -> float:
+        """How far it goes on the side that it shows less of, in half-widths."""
+        return float(min(-self.x[0], self.x[-1])) / self.half
+
+
 def half_width(feature: Feature, tip_radius: float) -> float:
     """Half of the strip that the feature disturbs on the trace, m (theory section 6)."""
     width = feature.width.median if np.isfinite(feature.width.median) else 0.0
@@ -129,8 +172,8 @@ def half_width(feature: Feature, tip_radius: float) -> float:
     return float(np.sqrt(2 * tip_radius * abs(feature.height.median))) + 0.5 * width
 
 
-def _nearest_crossing(feature: Feature, tip_radius: float, crossings: Sequence[Crossing]) -> Crossing | None:
-    """The crossing of the feature, not along it, that lies nearest to its middle."""
+def _nearest_crossings(feature: Feature, tip_radius: float, crossings: Sequence[Crossing]) -> list[Crossing]:
+    """The crossings of the feature, not along it, that which lies nearest to its middle first."""
     reference, _ = middle(feature.axis)
     half = half_width(feature, tip_radius)
     close = [
@@ -139,7 +182,7 @@ def _nearest_crossing(feature: Feature, tip_radius: float, crossings: Sequence[C
         if np.linalg.norm(crossing.point - nearest_on(crossing.point[None], feature.axis)[0][0]) < half
         and (len(feature.axis) == 1 or _angle(crossing, feature) > LEAST_SINE)
     ]
-    return min(close, key=lambda crossing: float(np.linalg.norm(crossing.point - reference)), default=None)
+    return sorted(close, key=lambda crossing: float(np.linalg.norm(crossing.point - reference)))
 
 
 def _window(feature: Feature, crossing: Crossing | None, trace: Trace) -> IntArray:

@@ -30,6 +30,13 @@ def test_without_a_crossing_the_nearest_sweep_is_taken() -> None:
     assert section is not None and section.sweep == 5
 
 
+def test_a_sweep_that_shows_both_sides_is_shown_rather_than_a_nearer_one_that_turns_on_the_crest() -> None:
+    every = sweeps()
+    turned = every.select((every.sweep != 4) | (every.centers[:, 1] < 0.3e-3))
+    section = cross_section(ridge(), turned, BASE, [crossing(4, -0.006), crossing(2, -0.018)])
+    assert section is not None and section.sweep == 2
+
+
 def test_a_sweep_that_turns_beside_the_line_shows_one_passage() -> None:
     """To and fro under one number, the way back 3 mm further along the line, where it is only half as high."""
     there = np.arange(-5e-3, 2e-3, 20e-6)
