@@ -13,7 +13,7 @@ from mapping import FloatArray
 from mapping.base.profiles.edges import EDGE_FREEDOM, Edge, felt_share
 from mapping.base.profiles.evidence import Scatter
 from mapping.base.profiles.jumps import MOST_JUMPS, SHORTEST_LEVEL, rises
-from mapping.instrument import neighbour_scatter
+from mapping.instrument import CONTACT_ROUNDING, neighbour_scatter
 
 # Share of a profile over which differences tell of a climb: twice the shortest level. Of one that takes more of it most
 # differences are a part, and none stands out; that is sought in the whole profile
@@ -179,13 +179,12 @@ class _Stretch:
         def descended(start: FloatArray, outlier: float) -> Any:
             return least_squares(self._off, np.clip(start, least + inner, most - inner), f_scale=outlier, **robust)
 
-        # of a profile without noise all that a start misses counts by its size, and no descent ends there: first, so
-        # much of it does not as half of it is
-        apart = [max(float(np.median(np.abs(self._off(each, run)))), CLIMB_OUTLIER) for each in starts]
-        near = [
-            descended(each, off).x if off > CLIMB_OUTLIER else each for each, off in zip(starts, apart, strict=True)
-        ]
-        ends = [descended(each, CLIMB_OUTLIER) for each in near]
+        if self.scale <= CONTACT_ROUNDING * self.tip_radius:
+            # without noise all that a start misses counts by its size, and no descent ends there: first, so much of it
+            # does not as half of it is
+            apart = [max(float(np.median(np.abs(self._off(each, run)))), CLIMB_OUTLIER) for each in starts]
+            starts = [descended(each, off).x for each, off in zip(starts, apart, strict=True)]
+        ends = [descended(each, CLIMB_OUTLIER) for each in starts]
         return np.asarray(min(ends, key=lambda end: float(end.cost)).x)
 
     @property

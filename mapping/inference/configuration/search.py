@@ -109,8 +109,10 @@ def searched(
                 if spent.all_work:
                     bounded = True
                     break
-                other = fitted(other_parts, place, best, anew=True)
-                spent.on(other_parts, place, GIVEN_UP_SHARE if other is None else 1.0)
+                # a closed course begins far from where it fits: of few courses none is given up
+                rival = best if proposal is JOIN else None
+                other = fitted(other_parts, place, rival, anew=True)
+                spent.on(other_parts, place, GIVEN_UP_SHARE if other is None and rival else 1.0)
                 if other is not None and other.log_odds > best.log_odds + WORTH:
                     best, joined, joining, joiner = other, laid(other_parts, place), True, proposal
         if joining:

@@ -160,9 +160,9 @@ def test_more_details_than_are_weighed_at_once_are_weighed_beside_each_other(mon
     corners = 0.1 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     base, sizes = Base(Surface(corners, [[0, 1, 2], [0, 2, 3]])), list[int]()
 
-    def counted(parts: Sequence[Part], *rest: Any) -> Configuration | None:
+    def counted(parts: Sequence[Part], *rest: Any, **named: Any) -> Configuration | None:
         sizes.append(len(parts))
-        return fitted(parts, *rest)
+        return fitted(parts, *rest, **named)
 
     monkeypatch.setattr(sys.modules[searched.__module__], "fitted", counted)
     monkeypatch.setattr(sys.modules[accounted.__module__], "CROWDED", together)
@@ -174,6 +174,7 @@ def test_more_details_than_are_weighed_at_once_are_weighed_beside_each_other(mon
     assert max(sizes) <= together + 2
     # what is not tried is said
     monkeypatch.setattr(sys.modules[searched.__module__], "MOST_FITTED", 2)
+    monkeypatch.setattr(sys.modules[searched.__module__], "FITS_OF_DETAIL", 1)
     assert all(ENDED_EARLY in each.notes for each in assemble(detect(trace, base), trace, base, faint=False))
     monkeypatch.undo()
     monkeypatch.setattr(sys.modules[searched.__module__], "MOST_WORK", 1e-3)
