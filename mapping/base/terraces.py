@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import FloatArray, IntArray
+from mapping.base.profiles import EDGE_FREEDOM
 from mapping.base.quadrics import (
     Cloud,
     Design,
@@ -32,8 +33,6 @@ FEWEST_PAIRS = 0.4
 # Of a run's samples, the share that is its end: the detail itself lies in the middle, and a median minds nothing that
 # reaches into less than half of an end
 END_SHARE = 8
-# A place is a parameter that only one cell in n fits: it costs twice what a level does (2 log n against log n)
-EDGE_FREEDOM = 2
 # More levels than that have no two cells PAIRS_APART of the extent from each other on one of them
 MOST_LEVELS = 8
 # Mean square, in standard deviations, up to which what lies about a height (FEATURE_RESIDUAL_SDS to either side) is as

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from mapping.base.profiles.edges import EDGE_FREEDOM as EDGE_FREEDOM
     from mapping.base.profiles.fit_profile import SHORTEST_BEND as SHORTEST_BEND, fit_profile as fit_profile
     from mapping.base.profiles.form import AUTO as AUTO, Form as Form
     from mapping.base.profiles.frame import profile_frame as profile_frame
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from mapping.base.profiles.jumps import SHORTEST_LEVEL as SHORTEST_LEVEL
 
 _PUBLIC = {
+    "edges": ("EDGE_FREEDOM",),
     "fit_profile": ("SHORTEST_BEND", "fit_profile"),
     "form": ("AUTO", "Form"),
     "frame": ("profile_frame",),

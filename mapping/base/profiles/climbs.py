@@ -13,7 +13,7 @@ from mapping import FloatArray
 from mapping.base.profiles.edges import EDGE_FREEDOM, Edge, felt_share
 from mapping.base.profiles.evidence import Scatter
 from mapping.base.profiles.jumps import MOST_JUMPS, SHORTEST_LEVEL, rises
-from mapping.instrument import CONTACT_ROUNDING, neighbour_scatter
+from mapping.instrument import CONTACT_ROUNDING, FEATURE_RESIDUAL_SDS, neighbour_scatter
 
 # Share of a profile over which differences tell of a climb: twice the shortest level. Of one that takes more of it most
 # differences are a part, and none stands out; that is sought in the whole profile
@@ -28,8 +28,6 @@ CLIMBS_TRIED = 12
 UPRIGHT_PLACES = 65
 # Coefficients of the parabola that the levels on either side lie on while a climb is sought
 GROUND_TERMS = 3
-# Scatters beyond which a residual counts by its size, not its square: as for details elsewhere (FEATURE_RESIDUAL_SDS)
-CLIMB_OUTLIER = 3.0
 
 
 def possible_climbs(
@@ -142,7 +140,7 @@ class _Stretch:
         known = np.delete(slanted, 1)
         tried = np.tile(known, (UPRIGHT_PLACES, 1))
         tried[:, 0] += np.linspace(-run, run, UPRIGHT_PLACES) / self.spacing
-        costs = [float(np.log1p((self._off(each, 0.0) / CLIMB_OUTLIER) ** 2).sum()) for each in tried]
+        costs = [float(np.log1p((self._off(each, 0.0) / FEATURE_RESIDUAL_SDS) ** 2).sum()) for each in tried]
         edge = known + np.eye(1, len(known))[0] * 0.5 * run / self.spacing * np.sign(known[1])
         upright = self._descended([known, edge, tried[int(np.argmin(costs))]], 0.0)
         plain = self.z - self.ground @ np.linalg.lstsq(self.ground, self.z, rcond=None)[0]
@@ -182,9 +180,9 @@ class _Stretch:
         if self.scale <= CONTACT_ROUNDING * self.tip_radius:
             # without noise all that a start misses counts by its size, and no descent ends there: first, so much of it
             # does not as half of it is
-            apart = [max(float(np.median(np.abs(self._off(each, run)))), CLIMB_OUTLIER) for each in starts]
+            apart = [max(float(np.median(np.abs(self._off(each, run)))), FEATURE_RESIDUAL_SDS) for each in starts]
             starts = [descended(each, off).x for each, off in zip(starts, apart, strict=True)]
-        ends = [descended(each, CLIMB_OUTLIER) for each in starts]
+        ends = [descended(each, FEATURE_RESIDUAL_SDS) for each in starts]
         return np.asarray(min(ends, key=lambda end: float(end.cost)).x)
 
     @property
