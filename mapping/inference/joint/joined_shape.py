@@ -144,7 +144,7 @@ class JoinedShape:
     def _held_crests(self, own: Sequence[FloatArray], sunk: FloatArray) -> FloatArray:
         """(M, fine * bins) highest of the crests that do not vary, known as far down as `sunk` (M,), m."""
         one, numbers = [each[:1] for each in own], range(len(self._varied), len(self._all))
-        for each in set(sunk.tolist()) - set(self._raised_by):
+        for each in [each for each in set(sunk.tolist()) if each not in self._raised_by]:  # other cores add to it
             crests = [
                 self._all[k].templates(piece)[0] for k in numbers for piece in self._crests(k, one, np.array([each]))
             ]
