@@ -21,7 +21,8 @@ SECTION_BINS = 60
 GRID = 241
 # Share of a feature's height that is not to be seen beside it: two pixels of a panel
 UNSEEN_SHARE = 0.01
-# Half-widths to either side that a section shows if one of the nearest sweeps does: both flanks end at one
+# Half-widths to either side that a section shows if one of the nearest sweeps does: both flanks end at one. Of
+# many that turn on the crest no more are laid on the base than a bound on time allows
 BOTH_SIDES, MOST_PASSAGES = 1.0, 8
 # Sine of the angle at which a sweep must cross a line to show its section: 30 degrees
 LEAST_SINE = 0.5
