@@ -144,7 +144,7 @@ def _places(inspection: Inspection) -> Places:
     """The heights that configurations are weighed on."""
     return Places(
         inspection.points, inspection.normals, inspection.over_terraces.height, inspection.samples, inspection.sweep,
-        inspection.spacing, inspection.height if len(inspection.lowered) else np.zeros(0),
+        inspection.spacing, inspection.height if len(inspection.lowered) else np.zeros(0), inspection.jumped,
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mapping import FloatArray, IntArray, Trace
+from mapping import FloatArray, IntArray, Trace, dots
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights
 from mapping.detection import terraced
 from mapping.instrument import Noise
@@ -33,6 +33,8 @@ class Inspection:
         normals: (M, 3) outward directions at the places; (0, 3) where they are not known.
         lowered: (M,) mean heights over the base's own level there, where it has several, m; (0,) if it has one.
         samples: (M,) samples behind each mean; (0,) where they are not known.
+        jumped: (M,) standard deviation of what each mean is off where the height jumps between two samples (see
+            `_jumped`), m; (0,) where it is not known.
     """
 
     points: FloatArray
@@ -43,6 +45,7 @@ class Inspection:
     normals: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     lowered: FloatArray = field(default_factory=lambda: np.zeros(0))
     samples: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    jumped: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
     def over_terraces(self) -> Inspection:
@@ -128,8 +131,9 @@ class Inspection:
         normals = self.normals[keep] if len(self.normals) else self.normals
         lowered = self.lowered[keep] if len(self.lowered) else self.lowered
         samples = self.samples[keep] if len(self.samples) else self.samples
+        jumped = self.jumped[keep] if len(self.jumped) else self.jumped
         columns = self.points[keep], self.height[keep], self.sd[keep], self.sweep[keep]
-        return Inspection(*columns, self.spacing, normals, lowered, samples)
+        return Inspection(*columns, self.spacing, normals, lowered, samples, jumped)
 
 
 class Inspections:
@@ -160,15 +164,17 @@ def inspect(trace: Trace, base: Base, noise: Noise, spacings: Collection[float])
     """Mean heights over stretches of the given lengths (m) along every sweep of the trace, which is passed once."""
     profiles: dict[float, list[SweepHeights]] = {spacing: [] for spacing in spacings}
     lowered: dict[float, list[FloatArray]] = {spacing: [] for spacing in spacings}
+    passed: dict[float, list[FloatArray]] = {spacing: [] for spacing in spacings}
     for own in LaidTrace.of(trace, base).laid_sweeps:
         if len(own.trace) > 1 and own.arclength[-1] > 0:
             for spacing, found in profiles.items():
                 pieces = own.heights(spacing)
                 found.extend(pieces)
+                passed[spacing] += [own.trace.centers[piece.first[0] : piece.first[-1]] for piece in pieces]
                 if len(base.levels) > 1:
                     lowered[spacing] += _over_terraces(own, pieces, base, trace.tip_radius)
     return {
-        spacing: _joined(found, lowered[spacing], base, noise, trace.tip_radius, spacing)
+        spacing: _joined(found, lowered[spacing], passed[spacing], base, noise, trace.tip_radius, spacing)
         for spacing, found in profiles.items()
     }
 
@@ -195,12 +201,13 @@ def _over_terraces(sweep: LaidSweep, pieces: Sequence[SweepHeights], base: Base,
 def _joined(
     profiles: Sequence[SweepHeights],
     lowered: Sequence[FloatArray],
+    passed: Sequence[FloatArray],
     base: Base,
     noise: Noise,
     tip_radius: float,
     spacing: float,
 ) -> Inspection:
-    """The inspection of some profiles in bins of one width."""
+    """The inspection of some profiles in bins of one width, of which the samples' centres (N, 3) each are known."""
     if not profiles:
         return Inspection(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), spacing)
     points, normals = [], []
@@ -218,7 +225,39 @@ def _joined(
     if noise.levels is not None:
         sd *= noise.levels.at(sweep, np.concatenate([profile.t for profile in profiles]))
     over = np.concatenate(lowered) if lowered else np.zeros(0)
-    return Inspection(np.concatenate(points), height, sd, sweep, spacing, np.concatenate(normals), over, samples)
+    off = np.concatenate([
+        _jumped(centers, np.diff(profile.first), up, noise.white)
+        for centers, profile, up in zip(passed, profiles, normals, strict=True)
+    ])  # fmt: skip
+    return Inspection(
+        np.concatenate(points), height, np.hypot(sd, off), sweep, spacing, np.concatenate(normals), over, samples, off
+    )
+
+
+def _jumped(centers: FloatArray, count: IntArray, up: FloatArray, white: float) -> FloatArray:
+    """(n,) standard deviation of what the means of bins in a row are off by where the height jumps, m.
+
+    A ball at a wall that is higher than its radius rises from one sample to the next, and where between them is not
+    known: the mean of n samples is off by J / n times what is uniform over one step, J / (n sqrt(12)). A jump is what a
+    step rises by more than both steps beside it, which a slope or a bend do not. One that moves a mean by less than the
+    noise does is left to that, and a single sample is no mean.
+
+    Args:
+        centers: (N, 3) centres of the samples, m.
+        count: (n,) samples in each bin, N in all.
+        up: (n, 3) directions off the base.
+        white: standard deviation of the white noise of a sample, m.
+    """
+    jumped, bins = np.zeros(len(count)), np.repeat(np.arange(len(count)), count)
+    if len(centers) < 4 or count.max() < 2:
+        return jumped
+    rise = dots(np.diff(centers, axis=0), up[bins[:-1]])
+    behind, ahead = rise[1:-1] - rise[:-2], rise[1:-1] - rise[2:]
+    jump = np.where(behind * ahead > 0.0, np.minimum(np.abs(behind), np.abs(ahead)), 0.0)
+    for own in (bins[1:-2], bins[2:-1]):  # those of the samples before it and behind it
+        moves = np.flatnonzero((count[own] > 1) & (jump**2 > 12.0 * count[own] * white**2))
+        np.maximum.at(jumped, own[moves], jump[moves] / (np.sqrt(12.0) * count[own[moves]]))
+    return jumped
 
 
 def _sd_of_means(noise: Noise, spacing: float, count: IntArray) -> FloatArray:

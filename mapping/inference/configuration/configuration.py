@@ -11,7 +11,7 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Interval, MappingError
 from mapping.geometry.mesh import distances
-from mapping.geometry.templates import crest_trace
+from mapping.geometry.templates import crest_trace, untouched_run
 from mapping.inference.configuration.common_deviation import Deviation, Fitted, common_deviation
 from mapping.inference.configuration.neighbourhood import NEIGHBOURHOOD_REACH, PARTS_OF_BIN, Neighbourhood
 from mapping.inference.curves import HIGHEST_DEGREE
@@ -23,6 +23,8 @@ from mapping.inference.families import (
     bell_beside,
     bell_ridge_beside,
     frustum_beside,
+    slanted_beginnings,
+    slanted_beside,
     smooth_beginnings,
     smooth_groove_beside,
     trapezoid_beside,
@@ -325,21 +327,34 @@ def as_bell(part: Part, half: float) -> Part:
     return Part(part.feature, bell, np.concatenate([known, [np.log(half), bell.start[-1]]]))
 
 
+def as_slanted(parts: Sequence[Part], k: int, place: Neighbourhood) -> Part:
+    """The k-th of some parts, an upright step, as one that climbs over a run, which begins as `as_smooth` has it."""
+    upright: Any = parts[k].shape
+    height = float(parts[k].start[upright.modes.count])
+    sizes = sizes_of(parts[k].feature, upright.tip_radius)
+    slanted = slanted_beside(upright, sizes, float(untouched_run(height, upright.tip_radius)))
+    begun = np.concatenate(slanted_beginnings(slanted, parts[k].start, parts[k].feature.details.run))
+    return _likeliest(parts, k, slanted, begun, place)
+
+
 def as_smooth(parts: Sequence[Part], k: int, place: Neighbourhood) -> Part:
     """The k-th of some parts, an upright groove, as one whose walls run out; of several sections the one that is
     likeliest beside the others begins."""
-    part, level = parts[k], len(place.levels) - 1
-    upright: Any = part.shape
-    sizes = sizes_of(part.feature, upright.tip_radius)
-    smooth = smooth_groove_beside(upright, sizes)
-    begun = smooth_beginnings(upright, part.start[None], sizes)
-    target = LogPosterior(place.joined([*(each.shape for each in parts[:k]), smooth,
-                                        *(each.shape for each in parts[k + 1 :])]), place.levels[level][0])  # fmt: skip
-    before, behind = (
-        np.concatenate([np.zeros(0), *(each.start for each in some)]) for some in (parts[:k], parts[k + 1 :])
+    upright: Any = parts[k].shape
+    sizes = sizes_of(parts[k].feature, upright.tip_radius)
+    begun = smooth_beginnings(upright, parts[k].start[None], sizes)
+    return _likeliest(parts, k, smooth_groove_beside(upright, sizes), begun, place)
+
+
+def _likeliest(parts: Sequence[Part], k: int, shape: Shape, begun: FloatArray, place: Neighbourhood) -> Part:
+    """The k-th of some parts in another family, at the likeliest beside the others of some parameters (N, P)."""
+    joined = place.joined([each.shape if m != k else shape for m, each in enumerate(parts)])
+    rows = np.tile(
+        np.concatenate([each.start if m != k else begun[0] for m, each in enumerate(parts)]), (len(begun), 1)
     )
-    rows = [np.concatenate([before, start, behind]) for start in begun]
-    return Part(part.feature, smooth, begun[int(np.argmax(target.log_density(np.array(rows))))])
+    rows[:, joined.columns[k]] = begun
+    target = LogPosterior(joined, place.levels[-1][0])
+    return Part(parts[k].feature, shape, begun[int(np.argmax(target.log_density(rows)))])
 
 
 def as_twin(part: Part, place: Neighbourhood, gap: float, *, lying: bool = False) -> Part:

@@ -51,6 +51,7 @@ class Places:
         spacing: distance between neighbours along a sweep, m.
         stepped: (M,) of a base with levels the heights over its lowest, where `height` is over the level that each
             place stands on; none: it has one level.
+        jumped: (M,) standard deviation of what each mean is off where the height jumps between samples, m; none: 0.
     """
 
     points: FloatArray
@@ -60,6 +61,7 @@ class Places:
     sweep: IntArray
     spacing: float
     stepped: FloatArray = field(default_factory=lambda: np.zeros(0))
+    jumped: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,6 +201,7 @@ def _finer(window: Window) -> Window:
         last=place + share * half,
         half=half / PARTS_OF_BIN,
         starts=PARTS_OF_BIN * window.starts,
+        jumped=np.repeat(np.broadcast_to(window.jumped, len(window)), PARTS_OF_BIN),
     )
 
 
@@ -227,5 +230,6 @@ def window_of(places: Places, keep: BoolArray) -> Window:
     flat = len(index) > 0 and float(np.ptp(normals, axis=0).max()) < SAME_PLANE
     half = np.full(len(index), 0.5 * places.spacing)
     count = places.samples[index].astype(np.int64)
+    jumped = places.jumped[index] if len(places.jumped) else 0.0
     return Window(points, normals, tangents, places.height[index], count, place, place + half, half, starts,
-                  int(count.sum()), bool(flat))  # fmt: skip
+                  int(count.sum()), bool(flat), jumped=jumped)  # fmt: skip

@@ -23,6 +23,7 @@ from mapping.inference.configuration.configuration import (
     as_bar,
     as_bell,
     as_frustum,
+    as_slanted,
     as_smooth,
     as_twin,
     laid,
@@ -38,6 +39,7 @@ from mapping.inference.families import (
     GrooveShape,
     RidgeShape,
     SmoothGrooveShape,
+    StepShape,
     TrapezoidShape,
     TwinShape,
     smooth_groove_beside,
@@ -83,7 +85,7 @@ MOST_RETOLD = 6
 
 def sections(now: Configuration) -> Iterator[Parts]:
     """Another section of a line that is wider than a wire of its height: round, flat, running out, or two in one; a
-    bump whose flank runs out or with a flat top, and a groove whose walls do."""
+    bump whose flank runs out or with a flat top, a groove whose walls do, and a step that climbs over a run."""
     for k, part in enumerate(now.parts):
         if isinstance(part.shape, BumpShape):
             half = sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
@@ -94,6 +96,8 @@ def sections(now: Configuration) -> Iterator[Parts]:
                 yield [*now.parts[:k], flat, *now.parts[k + 1 :]]
         if type(part.shape) is GrooveShape and not _has_crests_at_rims(part, now):
             yield [*now.parts[:k], as_smooth(now.parts, k, now.place), *now.parts[k + 1 :]]
+        if isinstance(part.shape, StepShape) and not part.shape.slanted:
+            yield [*now.parts[:k], as_slanted(now.parts, k, now.place), *now.parts[k + 1 :]]
         ridge = _ridge_of(part, now.place)
         if ridge is None or now.as_narrow_as_wires[k]:
             continue
@@ -475,6 +479,9 @@ def _alike(part: Part, axis: FloatArray, place: Neighbourhood, most: int = HIGHE
         return as_bar(line, place, float(shape.parts(part.start[None])[1][0]))
     if isinstance(shape, BellRidgeShape):
         return as_bell(line, float(np.exp(part.start[-2])))
+    if isinstance(shape, StepShape) and shape.slanted:
+        climbing = replace(part.feature, details=replace(part.feature.details, run=float(np.exp(part.start[-1]))))
+        return as_slanted([replace(line, feature=climbing)], 0, place)
     if isinstance(shape, SmoothGrooveShape):
         upright: Any = line.shape
         smooth = smooth_groove_beside(upright, sizes_of(part.feature, shape.tip_radius))

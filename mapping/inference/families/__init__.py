@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from mapping.inference.families.step import (
         OffsetRims as OffsetRims,
         StepShape as StepShape,
+        slanted_beginnings as slanted_beginnings,
         slanted_beside as slanted_beside,
     )
     from mapping.inference.families.trapezoid import (
@@ -102,7 +103,7 @@ _PUBLIC = {
         "smooth_pit_beside",
         "smooth_section",
     ),
-    "step": ("OffsetRims", "StepShape", "slanted_beside"),
+    "step": ("OffsetRims", "StepShape", "slanted_beginnings", "slanted_beside"),
     "trapezoid": (
         "FlatTopped",
         "FrustumShape",

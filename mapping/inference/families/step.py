@@ -17,6 +17,9 @@ from mapping.inference.likelihood import Prior, Uniform, Window
 # Climbs from this share of the disturbance's half-width to that one, all equally probable in their logarithm: as the
 # parts of a flat-topped section (`trapezoid`)
 NARROWEST_PART, WIDEST_PART = 0.01, 4.0
+# Runs of a climb, from the least to the most that its prior allows, at each of which the search for the optimum begins,
+# and how far beside the upright step's place its middle is tried, in runs: that lies between foot and upper edge
+BEGUN_RUNS, BEGUN_ASIDE = 6, np.linspace(-0.5, 0.5, 5)
 
 
 class Upright(LineShape, Protocol):
@@ -113,6 +116,24 @@ def slanted_beside(upright: StepShape, sizes: Sizes, untouched: float) -> StepSh
     start = np.append(upright.start, 0.5 * (prior.low + prior.high))
     priors = (*upright.priors, prior)
     return replace(upright, priors=priors, start=start, step=np.append(upright.step, 0.1), slanted=True)
+
+
+def slanted_beginnings(slanted: StepShape, upright: FloatArray, known: float | None = None) -> FloatArray:
+    """(runs, BEGUN_ASIDE, P) parameters that the search for a climb begins from, beside those of an upright step (P,).
+
+    Args:
+        slanted: the family.
+        upright: its course and height.
+        known: a run that is told, m; it is the first.
+    """
+    least, most = slanted.priors[-1].low, slanted.priors[-1].high
+    runs = np.linspace(least, most, BEGUN_RUNS + 2)[1:-1]
+    if known is not None:
+        runs = np.insert(runs, 0, np.clip(np.log(known), least, most))
+    begun = np.array([np.tile(np.append(upright, run), (len(BEGUN_ASIDE), 1)) for run in runs])
+    begun[..., 0] += BEGUN_ASIDE * np.exp(runs)[:, None]
+    begun[..., 0] = np.clip(begun[..., 0], slanted.priors[0].low, slanted.priors[0].high)
+    return begun
 
 
 @dataclass(frozen=True, eq=False)

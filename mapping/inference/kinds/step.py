@@ -11,16 +11,13 @@ import numpy as np
 from mapping import Feature, FloatArray, Interval
 from mapping.geometry.proxy import Part, Terrace
 from mapping.geometry.templates import contact_half_width, step_height, untouched_run
-from mapping.inference.families import PosteriorProblem, Sizes, StepShape, slanted_beside
+from mapping.inference.families import PosteriorProblem, Sizes, StepShape, slanted_beginnings, slanted_beside
 from mapping.inference.kinds.kind import Section, place_sd, preliminary, uphill
 from mapping.inference.kinds.lines import LineKind, Parameters, Traced
 from mapping.inference.kinds.posterior_density import height_prior
 
 # Places at which an edge is looked for, at most: one in each bin up to walls a thirtieth of a disturbance wide
 EDGE_PLACES = 400
-# Runs of a climb, from the least to the most that its prior allows, at each of which the search for the optimum begins,
-# and how far beside the upright step's place its middle is tried, in runs: that lies between foot and upper edge
-BEGUN_RUNS, BEGUN_ASIDE = 6, np.linspace(-0.5, 0.5, 5)
 
 
 class Step(LineKind):
@@ -65,11 +62,7 @@ class Step(LineKind):
         height = float(optimum[upright.modes.count])
         shape = slanted_beside(upright, problem.sizes, float(untouched_run(height, upright.tip_radius)))
         target, begun = replace(problem.target, shape=shape), list[FloatArray]()
-        known, (least, most) = problem.feature.details.run, (shape.priors[-1].low, shape.priors[-1].high)
-        told = [] if known is None else [float(np.clip(np.log(known), least, most))]
-        for run in [*told, *np.linspace(least, most, BEGUN_RUNS + 2)[1:-1]]:
-            tried = np.tile(np.append(optimum, run), (len(BEGUN_ASIDE), 1))
-            tried[:, 0] = np.clip(tried[:, 0] + BEGUN_ASIDE * np.exp(run), shape.priors[0].low, shape.priors[0].high)
+        for tried in slanted_beginnings(shape, optimum, problem.feature.details.run):
             begun.append(tried[int(np.argmax(target.log_density(tried)))])
         return [replace(problem, target=target, beginnings=np.array(begun))]
 

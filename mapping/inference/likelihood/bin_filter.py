@@ -30,6 +30,7 @@ def bin_filter(window: Window, noise: Noise, floor: float, inflation: FloatArray
     own = (noise.white**2 + floor**2) / count
     if inflation is not None:
         own = own * inflation + (inflation - 1.0) * noise.correlated_sd**2
+    own = own + np.square(window.jumped)
     begins = np.zeros(len(count), dtype=bool)
     begins[window.starts[:-1]] = True
     steps = mean_steps(noise.terms, _distance_from_previous(window), own, np.maximum(count, 1.0))

@@ -42,6 +42,7 @@ class Window:
         flat: True if all of them stand on one plane of the base: it neither bends nor folds between them.
         passes: (n,) passes over one line, of which the bin is the mean.
         level: (n,) standard deviation of the noise over that of its law.
+        jumped: (n,) standard deviation of what else a bin's mean is off, where the height jumps between samples, m.
     """
 
     feet: FloatArray
@@ -57,6 +58,7 @@ class Window:
     flat: bool = False
     passes: IntArray | int = 1
     level: FloatArray | float = 1.0
+    jumped: FloatArray | float = 0.0
 
     def __len__(self) -> int:
         return len(self.height)
@@ -89,6 +91,7 @@ class Window:
             samples=int(self.count[keep].sum()),
             passes=own(self.passes),
             level=own(self.level),
+            jumped=own(self.jumped),
         )
 
 
