@@ -91,15 +91,25 @@ class _Section:
         inside = self.low < begin[0] and end[-1] < self.high
         return bool(inside and (np.abs(self.sines) < STEEPEST_SINE).all())
 
-    def steps(self, noise: float, cell: float) -> bool:
+    def steps(self, p: FloatArray, missed: FloatArray, noise: float, cell: float) -> bool:
         """True of two lines that are one another's parallels, as far as heights of a noise (m) tell, with a climb
-        between them like what a ball makes of a wall: no wider than its radius and a cell (m), whose mean is on its way
-        up as soon as its last sample is, and nowhere rounder than it follows."""
+        between them like what a ball makes of a wall: nowhere rounder than it follows, and no wider than its radius and
+        a cell (m), whose mean is on its way up as soon as its last sample is; or no face, which most of the cells over
+        it would lie on.
+
+        Args:
+            p: (C,) places of cells across the line, m.
+            missed: (C,) what it misses of them, m.
+            noise, cell: m.
+        """
         places, sines, round_ones = self.places, self.sines, np.cumsum(np.append(0, self.rounding > 0.0))
         first, last = np.triu_indices(len(places), 1)
         turned = np.abs(sines[last + 1] - sines[first]) * (self.high - self.low)
         sharp = round_ones[last + 1] == round_ones[first]
-        like_a_wall = sharp & (places[last] - places[first] < self.tip_radius + cell)
+        held = np.abs(missed) < FEATURE_RESIDUAL_SDS * noise
+        between = (p > places[first, None]) & (p < places[last, None])
+        no_face = (between & held).sum(axis=1) < 0.5 * between.sum(axis=1)
+        like_a_wall = sharp & ((places[last] - places[first] < self.tip_radius + cell) | no_face)
         return bool((like_a_wall & (turned < FEATURE_RESIDUAL_SDS * noise)).any())
 
     def outline(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -147,7 +157,7 @@ def extrusion(cloud: Cloud) -> Fitted | None:
         if cost < least:
             least, best = cost, now
             # noise alone leaves 0.67 of it
-            explained = bool(np.median(np.abs(_missed(best, thinned, cloud.tip_radius))) < cloud.floor)
+            explained = bool(np.median(np.abs(_missed(best, thinned, cloud.tip_radius))) < cloud.scale)
         elif explained:
             break
     if not len(best):
@@ -156,12 +166,13 @@ def extrusion(cloud: Cloud) -> Fitted | None:
     section, frame, along = _laid(theta, cloud.points, cloud.tip_radius)
     onward = np.diff(cloud.sweep) == 0
     cell = float(np.median(np.linalg.norm(np.diff(cloud.points, axis=0)[onward], axis=1))) if onward.any() else 0.0
-    if not section.possible or section.steps(cloud.floor, cell):
+    missed = _missed(theta, cloud.points, cloud.tip_radius)
+    if not section.possible or section.steps(cloud.points @ frame[0], missed, cloud.scale, cell):
         return None
     return Fitted(
         "extrusion",
         _parameters(section, frame, cloud),
-        _missed(theta, cloud.points, cloud.tip_radius),
+        missed,
         len(theta),
         lambda cloud, spacing: _mesh(section, frame, along, cloud, spacing),
     )
@@ -189,7 +200,7 @@ def _across(turn: float, points: FloatArray, cloud: Cloud) -> tuple[FloatArray, 
     # from piece to piece the slope changes by 0 +- 1: what holds for pieces between two rows
     bends = np.pad(np.diff(np.eye(STRAIGHT_PIECES + 1), 2, axis=0) / (knots[1] - knots[0]), ((0, 0), (0, 1)))
     values = np.append(points[:, 2], np.zeros(len(bends)))
-    fit = robust_fit(np.vstack([design, cloud.floor * bends]), values, cloud.floor)
+    fit = robust_fit(np.vstack([design, cloud.scale * bends]), values, cloud.scale)
     return knots, fit.residual[: len(points)], fit.coefficients
 
 
@@ -253,7 +264,7 @@ def _cost(theta: FloatArray, points: FloatArray, cloud: Cloud) -> float:
     """Truncated chi-square and the price of the parameters (Schwarz); endless of a section that is none."""
     if not _laid(theta, points, cloud.tip_radius)[0].possible:
         return float("inf")
-    missed = _missed(theta, points, cloud.tip_radius) / cloud.floor
+    missed = _missed(theta, points, cloud.tip_radius) / cloud.scale
     truncated = float(np.minimum(missed**2, FEATURE_RESIDUAL_SDS**2).sum())
     return truncated + len(theta) * float(np.log(len(points)))
 
@@ -262,7 +273,7 @@ def _settled(theta: FloatArray, points: FloatArray, cloud: Cloud) -> FloatArray:
     """Least absolute misses, then least squares over what the body explains."""
     theta, kept = _fit(theta, points, cloud, "soft_l1"), np.zeros(len(points), dtype=bool)
     for _ in range(PARTED_ROUNDS):
-        near = np.abs(_missed(theta, points, cloud.tip_radius)) < FEATURE_RESIDUAL_SDS * cloud.floor
+        near = np.abs(_missed(theta, points, cloud.tip_radius)) < FEATURE_RESIDUAL_SDS * cloud.scale
         if (near == kept).all() or near.sum() < 2 * len(theta):
             break
         kept, theta = near, _fit(theta, points[near], cloud, "linear")
@@ -292,7 +303,7 @@ def _fit(start: FloatArray, points: FloatArray, cloud: Cloud, loss: str) -> Floa
     scale = np.array([1.0, 1.0, size, 1.0, *[size, 1.0, size] * count])
     free = -np.inf
     least = np.array([*[free] * 4, *[free, free, 0.0], *[0.0, free, 0.0] * (count - 1)])
-    settings: dict[str, Any] = {"loss": loss, "f_scale": cloud.floor, "x_scale": scale, "max_nfev": SECTION_STEPS}
+    settings: dict[str, Any] = {"loss": loss, "f_scale": cloud.scale, "x_scale": scale, "max_nfev": SECTION_STEPS}
     found = least_squares(_missed, start, args=(points, cloud.tip_radius), bounds=(least, np.inf), **settings)
     return np.asarray(found.x)
 

@@ -61,6 +61,9 @@ FEWEST_HALF = 3
 # A base foretells a path if it misses it by no more than so many times the scatter from cell to cell, that is if of the
 # variance at most three quarters are of something else: of the fit's own error, and of noise that wanders
 FORETOLD = 2.0
+# Mean square, in the scale, of what is no noise but rounding: cells scatter by half of the scale at least from one to
+# the next, and a fit that they miss by a tenth of it is exact
+EXACT_SQUARE = 1e-2
 # Variance of a median of Gaussian values over that of their mean
 OF_MEDIAN = 0.5 * np.pi
 # Rounds in which a base through the ends of sweeps takes in what lies as it does: each is a candidate, so that one
@@ -133,15 +136,15 @@ def fit_base(
     missed_by_all = all(_missed(fit, cloud) > EXPLAINED for fit in fits)
     through_ends = _of_ends(cloud) if missed_by_all else []
     fits += [fit for fit in through_ends if _holds_ends(fit, cloud)]
-    nearest = min(fits, key=lambda fitted: fitted.cost(cloud.floor))
+    nearest = min(fits, key=lambda fitted: fitted.cost(cloud.scale))
     # the details of a crowded plate take most of its path: what lies on them is no noise of the base between them
-    on_base = np.abs(nearest.residual) < FEATURE_RESIDUAL_SDS * cloud.floor
+    on_base = np.abs(nearest.residual) < FEATURE_RESIDUAL_SDS * cloud.scale
     on_base |= nearest not in through_ends
-    scale, share = _noise_of(nearest.residual[on_base], cloud.sweep[on_base], cloud.floor)
+    scale, share = _noise_of(nearest.residual[on_base], cloud.sweep[on_base], cloud.scale)
     alone = _alone(nearest.residual, cloud) if missed_by_all and nearest not in through_ends else None
     if alone is not None:
         # most of the path may lie on one detail, and what all sweeps miss there counts as one sweep's
-        own, of_own = _noise_of(alone, cloud.sweep, cloud.floor)
+        own, of_own = _noise_of(alone, cloud.sweep, cloud.scale)
         if all(np.median(np.abs(fit.residual)) > EXPLAINED * own for fit in fits):
             fits += through_ends
             scale, share = own, of_own / len(np.unique(cloud.sweep))
@@ -181,7 +184,7 @@ def _foretold(best: Fitted, trace: Trace, through_ends: bool) -> float | None:
     fits = [fit for fit in _of_ends(cloud) if fit.kind == best.kind] if through_ends else _fits(family, cloud)
     if not fits:
         return None
-    fit = min(fits, key=lambda fitted: fitted.cost(cloud.floor))
+    fit = min(fits, key=lambda fitted: fitted.cost(cloud.scale))
     others = Cells.of(trace.select(~half), MOST_BASE_CELLS)
     asked = _ends(others.sweep) if through_ends else np.ones(len(others.sweep), dtype=bool)
     centers, sweep = others.centers[asked], others.sweep[asked]
@@ -192,7 +195,7 @@ def _foretold(best: Fitted, trace: Trace, through_ends: bool) -> float | None:
     # nor by more as a whole sweep than so many times what its cells make of that
     over = base.foot(centers, trace.tip_radius).height[:, None] - base.levels
     height = over[np.arange(len(over)), np.abs(over).argmin(axis=1)]
-    alike, apart = _shares(height, sweep, max(scatter, cloud.floor))
+    alike, apart = _shares(height, sweep, max(scatter, cloud.scale))
     return missed if apart >= alike / FORETOLD**2 else None
 
 
@@ -206,7 +209,7 @@ def _last_resort(families: Iterable[Family], cloud: Cloud) -> list[Fitted]:
 
 def _missed(fit: Fitted, cloud: Cloud) -> float:
     """Distance within which half of the cells lie from the fitted surface, in the scatter of neighbouring cells."""
-    return float(np.median(np.abs(fit.residual))) / cloud.floor
+    return float(np.median(np.abs(fit.residual))) / cloud.scale
 
 
 def _unexplained(fits: Iterable[Fitted], cloud: Cloud) -> bool:
@@ -232,7 +235,7 @@ def _independent(residual: FloatArray) -> float:
     where that is noise: a detail is even from cell to cell, and where a quarter of the path lies on some, one sound
     cell in seven would count."""
     near = np.abs(residual) < FEATURE_RESIDUAL_SDS
-    square = max(float((residual[near] ** 2).sum()) / max(int(near.sum()), 1), 1e-12)
+    square = max(float((residual[near] ** 2).sum()) / max(int(near.sum()), 1), EXACT_SQUARE)
     products = (residual[1:] * residual[:-1])[near[1:] & near[:-1]]
     return independent_share(float(products.sum()) / max(len(products), 1) / square)
 
@@ -241,7 +244,7 @@ def _shares(residual: FloatArray, sweep: IntArray, scale: float) -> tuple[float,
     """The share of cells (C,) that count as independent, by how alike neighbours are along the sweeps, and by how far
     the sweeps' medians scatter; of few sweeps that is no less."""
     kept = np.clip(residual / scale, -FEATURE_RESIDUAL_SDS, FEATURE_RESIDUAL_SDS)
-    square = max(float((kept**2).mean()), 1e-12)
+    square = max(float((kept**2).mean()), EXACT_SQUARE)
     alike = independent_share(float((kept[1:] * kept[:-1]).mean()) / square)
     own = [kept[sweep == number] for number in np.unique(sweep)]
     if len(own) < FEWEST_HALF:
@@ -268,7 +271,7 @@ def _of_ends(cloud: Cloud) -> list[Fitted]:
         near = _ends(cloud.sweep)
         for _ in range(ENDS_ROUNDS):
             fit = height_field(design, kind, cloud, among=near)
-            near = np.abs(fit.residual) < FEATURE_RESIDUAL_SDS * cloud.floor
+            near = np.abs(fit.residual) < FEATURE_RESIDUAL_SDS * cloud.scale
             if near.sum() < len(near) // END_SHARE:
                 break
             found.append(fit)
@@ -279,13 +282,13 @@ def _ends_in_a_plane(cloud: Cloud) -> bool:
     """True if nearly all sweeps begin and end on one plane: what bends between its ends is a detail on it, or steps."""
     ends = _ends(cloud.sweep)
     fit = height_field(plane_design, "plane", cloud, among=ends)
-    return bool(np.mean(np.abs(fit.residual[ends]) < FEATURE_RESIDUAL_SDS * cloud.floor) > ALL_ENDS)
+    return bool(np.mean(np.abs(fit.residual[ends]) < FEATURE_RESIDUAL_SDS * cloud.scale) > ALL_ENDS)
 
 
 def _holds_ends(fit: Fitted, cloud: Cloud) -> bool:
     """True if most of the sweeps' ends lie on a base: as many as tell it against details that the others end on."""
     off = np.abs(fit.residual[_ends(cloud.sweep)])
-    return bool(np.mean(off < FEATURE_RESIDUAL_SDS * cloud.floor) > MOST_ENDS)
+    return bool(np.mean(off < FEATURE_RESIDUAL_SDS * cloud.scale) > MOST_ENDS)
 
 
 def _ends(sweep: IntArray) -> BoolArray:

@@ -13,7 +13,7 @@ from mapping.base.base import FIT_MARGIN, FitValue
 from mapping.base.cells import Cells
 from mapping.base.profiles import SHORTEST_BEND
 from mapping.geometry.mesh import distances, spline_design
-from mapping.instrument import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_fit, robust_scale
+from mapping.instrument import FEATURE_RESIDUAL_SDS, MAD_TO_SD, least_noise, robust_fit, robust_scale
 
 # Upward part of the mean direction from a round body's middle of what was felt inside it, without contact normals
 BELOW = -0.6
@@ -83,7 +83,7 @@ class Cloud:
         points = (means - origin) @ axes.T
         outward = None if normals is None else normals @ axes.T
         reach = float(np.linalg.norm(trace.centers - means[cells.cell], axis=1).max())
-        scatter = _roughness(points, cells.sweep)
+        scatter = max(_roughness(points, cells.sweep), least_noise(points, trace.tip_radius))
         return cls(points, origin, axes, scatter, trace.tip_radius, outward, cells.sweep, inside, reach)
 
     def world(self, points: FloatArray) -> FloatArray:
@@ -100,11 +100,6 @@ class Cloud:
         if self.outward is not None:
             return float((self.outward * away).sum(axis=1).mean()) < 0.0
         return float((away.mean(axis=0) @ self.axes)[2]) < BELOW
-
-    @property
-    def floor(self) -> float:
-        """The scale, but no less than rounding errors, m."""
-        return max(self.scale, 1e-12 * float(np.abs(self.points).max()), float(np.finfo(float).tiny))
 
     @property
     def margin(self) -> float:
@@ -217,7 +212,7 @@ def height_field(
         pieces: of its spline along both axes.
     """
     x, y, z = cloud.points.T
-    prior = np.zeros((0, design(x[:1], y[:1]).shape[1])) if bends is None else cloud.floor * bends
+    prior = np.zeros((0, design(x[:1], y[:1]).shape[1])) if bends is None else cloud.scale * bends
     columns, which = design(x, y), slice(None) if among is None else among
     fit = robust_fit(np.vstack([columns[which], prior]), np.append(z[which], np.zeros(len(prior))), cloud.scale)
 
@@ -432,7 +427,7 @@ def cylinder(cloud: Cloud) -> Fitted | None:
         scale = max(cloud.scale, 1e-9 * radius)
         found = least_squares(residual, [start[0], start[1], 0.0, 0.0, radius], loss="soft_l1", f_scale=scale)
         misses = residual(found.x)
-        cost = float(np.minimum((misses / cloud.floor) ** 2, FEATURE_RESIDUAL_SDS**2).sum())
+        cost = float(np.minimum((misses / cloud.scale) ** 2, FEATURE_RESIDUAL_SDS**2).sum())
         if best is None or cost < best[0]:
             best, missed = (cost, found.x, axis, across), misses
     assert best is not None

@@ -69,7 +69,7 @@ def _bears(waves: int, freedom: int, radius: float, cloud: Cloud) -> bool:
 def _solved(design: FloatArray, radius: FloatArray, waves: FloatArray, cloud: Cloud) -> tuple[FloatArray, FloatArray]:
     """Coefficients (P,) and misses (C,) m of the radii; where nothing was felt, as few departures as possible."""
     sd = DEPARTURE * float(np.median(radius)) / np.maximum(waves * (waves + 1.0), 1.0)
-    prior = np.diag(cloud.floor / sd)[waves > 0]
+    prior = np.diag(cloud.scale / sd)[waves > 0]
     fit = robust_fit(np.vstack([design, prior]), np.concatenate([radius, np.zeros(len(prior))]), cloud.scale)
     return fit.coefficients, fit.residual[: len(radius)]
 

@@ -95,7 +95,7 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
     # what differences cannot tell, the constant, comes out as zero: the levels hold it
     slopes = robust_fit(columns[one] - columns[other], z[one] - z[other], np.sqrt(2.0) * cloud.scale).coefficients
     rest = z - columns @ slopes
-    paired = max(cloud.floor, robust_scale(rest[one] - rest[other]) / np.sqrt(2.0))
+    paired = max(cloud.scale, robust_scale(rest[one] - rest[other]) / np.sqrt(2.0))
     levels = _levels(rest, cloud, paired)
     for _ in range(LEVEL_ROUNDS):
         if len(levels.heights) < 2:
@@ -157,7 +157,7 @@ def _levels(rest: FloatArray, cloud: Cloud, paired: float) -> _Levels:
         paired: standard deviation of cells that lie apart, m.
     """
     sweep, scale = cloud.sweep, _scatter(rest, paired)
-    share = independent_share(1.0 - (cloud.floor / scale) ** 2)
+    share = independent_share(1.0 - (cloud.scale / scale) ** 2)
     reach = FEATURE_RESIDUAL_SDS * scale
     heights: list[float] = []
     level = np.full(len(rest), -1, dtype=np.int64)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         CONTACT_ROUNDING as CONTACT_ROUNDING,
         Noise as Noise,
         estimate_noise as estimate_noise,
+        least_noise as least_noise,
     )
     from mapping.instrument.noise_fit import fit_noise as fit_noise
     from mapping.instrument.robust import (
@@ -47,7 +48,7 @@ _PUBLIC = {
     "core": ("core_of", "fit_on_densest", "span_of"),
     "levels": ("Levels",),
     "noise_fit": ("fit_noise",),
-    "noise": ("CONTACT_ROUNDING", "Noise", "estimate_noise"),
+    "noise": ("CONTACT_ROUNDING", "Noise", "estimate_noise", "least_noise"),
     "robust": (
         "BISQUARE",
         "FEATURE_RESIDUAL_SDS",

@@ -15,8 +15,9 @@ from mapping.instrument.robust import robust_sd
 from mapping.instrument.states import point_steps
 from mapping.instrument.term import Term
 
-# Rounding of contact geometry, in tip radii: noise is never taken to be smaller.
+# Rounding of contact geometry, in tip radii, and of numbers, in the greatest of them: no noise is taken to be smaller
 CONTACT_ROUNDING = 1e-8
+LEAST_DIGITS = 1e-12
 
 # A correlated part must lower chi-square by this much, or the noise counts as white.
 LEAST_CHI_SQUARE_GAIN = 6.0
@@ -224,6 +225,11 @@ class Noise:
         filter_ = steps.filter(np.arange(count), np.arange(count) == 0, np.ones(count, dtype=bool))
         whitened = filter_.whiten(np.ascontiguousarray(columns.reshape(count, -1).T))
         return np.ascontiguousarray(whitened.T).reshape(columns.shape), filter_.logdet
+
+
+def least_noise(heights: FloatArray, tip_radius: float) -> float:
+    """Standard deviation (m) below which no noise of heights or places (N, ...), m, is told from rounding."""
+    return max(CONTACT_ROUNDING * tip_radius, LEAST_DIGITS * float(np.abs(heights).max(initial=0.0)))
 
 
 def estimate_noise(residual: ArrayLike, s: ArrayLike) -> Noise:

@@ -19,6 +19,7 @@ _KNOWN = frozenset(SENTINELS.tolist())
 OUTSIDE = 0.5  # of the range of the others: a sentinel of that kind stands off by more
 LONELY = 5.0  # ranges of the others: a value that repeats and is no known sentinel must stand off by more
 FEWEST = 7  # rows that show what is usual: fewer have no value far off all others
+REPEATED = 0.5  # most rows of what is flat, read without noise, are as the row before
 REPEATS = 3  # such a value comes so often at least: two equal outliers may be chance
 TURN = 0.1  # of the extent along the rows: less is noise or a start, not the end of a row
 STRAIGHT = 0.3  # a row strays sideways by less of its own length; a half circle by 0.5
@@ -72,9 +73,18 @@ def sentinels(values: FloatArray) -> BoolArray:
             continue
         least, most = _range(values, others)
         gap = least - extreme if side > 0 else extreme - most
-        if gap > LONELY * (most - least) > 0:
+        if gap > LONELY * (most - least) > 0 and not _is_level(values, same, others):
             found |= same
     return found
+
+
+def _is_level(values: FloatArray, same: BoolArray, others: BoolArray) -> bool:
+    """True of a value that repeats from row to row where the others do so as well: what is flat was read without noise.
+
+    Below a wall that is higher than the tip's radius no reading is near those above it.
+    """
+    again = np.append(False, values[1:] == values[:-1])
+    return all(np.count_nonzero(again & own) > REPEATED * np.count_nonzero(own) for own in (same, others))
 
 
 def _range(values: FloatArray, which: BoolArray) -> tuple[float, float]:

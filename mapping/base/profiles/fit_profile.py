@@ -17,9 +17,9 @@ from mapping.base.profiles.isolated_bends import Bend, isolated_bends, isolated_
 from mapping.base.profiles.jumps import MOST_JUMPS, SHORTEST_LEVEL, possible_jumps, told_apart
 from mapping.geometry.mesh import Spline, spline_design
 from mapping.instrument import (
-    CONTACT_ROUNDING,
     RobustFit,
     fit_on_densest,
+    least_noise,
     neighbour_scatter,
     robust_fit,
     robust_scale,
@@ -31,8 +31,6 @@ SHORTEST_BEND = 8.0
 # Pieces that are tried; the evidence chooses.
 PIECES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 PROFILE_CELLS = 480
-# Of the greatest height: an exact profile has no smaller scatter than its digits
-LEAST_DIGITS = 1e-12
 # A piece of a cubic has four coefficients: with fewer places between masked stretches than that nothing determines it
 CELLS_PER_PIECE = 4
 
@@ -155,7 +153,7 @@ def _likeliest(
     Its further coefficients are the edges' heights. What slanted edges lead to and back from is no level but a detail.
     """
     upright = [Edge.upright(int(i)) for i in possible_jumps(x, z, scale, tip_radius)]
-    least = max(scale, CONTACT_ROUNDING * tip_radius, LEAST_DIGITS * float(np.abs(z).max()))
+    least = max(scale, least_noise(z, tip_radius))
     slanted = possible_climbs(x, z, samples, _scatter(splines, x, z, upright, least, tip_radius)[0], least, tip_radius)
     while slanted:
         found = fit, spline, edges, scatter = _chosen(splines, x, z, [*slanted, *upright], least, tip_radius)

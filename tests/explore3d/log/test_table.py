@@ -295,6 +295,22 @@ def test_a_wall_that_a_row_climbs_from_one_sample_to_the_next_does_not_cut_it(
     assert np.array_equal(read(tmp_path, rows(points)).trace.sweep, line)
 
 
+def test_a_level_of_zeros_below_a_high_wall_is_not_left_out(tmp_path: Path) -> None:
+    """Read without noise it repeats, and stands far off all others: they repeat as well. A machine that writes 0 where
+    it has nothing does so amid readings that differ."""
+    x = np.arange(0.0, 20.0, 0.05)
+    z = np.where(
+        x < 9.7, 0.0, 4.0 - np.maximum(0.5 - np.sqrt(np.maximum(0.25 - np.minimum(x - 10.2, 0.0) ** 2, 0.0)), 0.0)
+    )
+    log = read(tmp_path, "x_mm,z_mm\n" + "\n".join(f"{a!r},{b!r}" for a, b in zip(x.tolist(), z.tolist(), strict=True)))
+    assert len(log.trace) == len(x)
+    noisy = np.where(z > 0.0, z + np.random.default_rng(1).normal(0.0, 1e-3, len(z)), 0.0)
+    log = read(
+        tmp_path, "x_mm,z_mm\n" + "\n".join(f"{a!r},{b!r}" for a, b in zip(x.tolist(), noisy.tolist(), strict=True))
+    )
+    assert len(log.trace) == np.count_nonzero(z)
+
+
 def test_noise_much_larger_than_the_spacing_does_not_cut_sweeps(tmp_path: Path) -> None:
     rng = np.random.default_rng(6)
     points = np.column_stack([np.arange(20_000) * 6e-3, *rng.normal(0, 0.2, (2, 20_000))])
