@@ -8,7 +8,7 @@ step the body keeps to another level.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from mapping.assembly.lines import ONE_POINT, Around, mean_point, merged
 from mapping.assembly.linking import Inspection, groups, main_line, uphill
 from mapping.detection import Crossing
 from mapping.geometry.mesh import arclengths, distances, nearest_on
+from mapping.geometry.templates import contact_half_width
+from mapping.inference.configuration import NEIGHBOURHOOD_REACH
 from mapping.inference.kinds import kind_made_of
 
 # A stretch is straight if it bends by less than this share of its rise, once its first part is left out, where the
@@ -42,7 +44,8 @@ class Hinge:
 def edge_features(crossings: Sequence[Crossing], around: Around) -> tuple[list[Feature], list[Crossing]]:
     """Edges that at least two sweeps agree on, and the crossings that they do not explain."""
     crests = [c for c in crossings if c.kind in ("convex", "concave")]
-    hinges = [h for c in crests if (h := _hinge(c, around.inspection)) is not None]
+    over = around.inspection.over_terraces  # stairs run off a base's lowest level in a line, too
+    hinges = [h for c in crests if (h := _hinge(c, over)) is not None]
     features, rest = [], list(crossings)
     for group in _groups(hinges, SAME_EDGE * around.tip_radius):
         if len({h.crossing.sweep for h in group}) < 2:
@@ -160,9 +163,14 @@ def _explained(step: Crossing, features: Sequence[Feature], tip_radius: float) -
 
 def _step(line: list[Crossing], around: Around) -> Feature:
     half_width = float(np.median([c.half_width for c in line]))
+    height = float(np.median([abs(c.height) for c in line]))
+    # a sweep climbs to where it crossed the edge; over more than the window of an upright one would hold it is slanted
+    upright = float(contact_half_width(min(height, around.tip_radius), 0.0, around.tip_radius))
+    run = half_width - 0.5 * upright if half_width > NEIGHBOURHOOD_REACH * upright else None
+    if run is not None:
+        line = [replace(c, point=c.point - 0.5 * c.half_width * uphill(c)) for c in line]
     points = np.array([mean_point(cluster) for cluster in merged(line, ONE_POINT * half_width)])
     axis = main_line(points)
-    height = float(np.median([abs(c.height) for c in line]))
     sd = float(np.median([c.height_sd for c in line]) / np.sqrt(len(line)))
     length = float(arclengths(axis)[-1])
     slack = 2 * around.inspection.pitch
@@ -177,7 +185,7 @@ def _step(line: list[Crossing], around: Around) -> Feature:
         evidence=Support(float(np.sqrt(sum(c.snr**2 for c in line))), len(line), (around.detections.algorithm,)),
         curvature_feature=any(c.curvature_feature for c in line),
         position_sd=float(np.median([c.position_sd for c in line])),
-        details=Details(high_side=_high_side(line, axis, normals)),
+        details=Details(high_side=_high_side(line, axis, normals), run=run),
     )
 
 

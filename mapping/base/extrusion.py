@@ -10,6 +10,7 @@ import numpy as np
 
 from mapping import FloatArray, Surface
 from mapping.base.base import FitValue
+from mapping.base.profiles import SHORTEST_BEND
 from mapping.base.quadrics import Cloud, Fitted, grid_faces, pieces_of
 from mapping.geometry.mesh import spline_design
 from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit
@@ -91,26 +92,16 @@ class _Section:
         inside = self.low < begin[0] and end[-1] < self.high
         return bool(inside and (np.abs(self.sines) < STEEPEST_SINE).all())
 
-    def steps(self, p: FloatArray, missed: FloatArray, noise: float, cell: float) -> bool:
-        """True of two lines that are one another's parallels, as far as heights of a noise (m) tell, with a climb
-        between them like what a ball makes of a wall: nowhere rounder than it follows, and no wider than its radius and
-        a cell (m), whose mean is on its way up as soon as its last sample is; or no face, which most of the cells over
-        it would lie on.
-
-        Args:
-            p: (C,) places of cells across the line, m.
-            missed: (C,) what it misses of them, m.
-            noise, cell: m.
-        """
+    def steps(self, noise: float, cell: float) -> bool:
+        """True of two lines that are one another's parallels, as far as heights of a noise (m) tell, with a sharp climb
+        between them that is no wider than a detail and a cell (m), whose mean is on its way up as soon as its last
+        sample is: a step, upright or slanted."""
         places, sines, round_ones = self.places, self.sines, np.cumsum(np.append(0, self.rounding > 0.0))
         first, last = np.triu_indices(len(places), 1)
         turned = np.abs(sines[last + 1] - sines[first]) * (self.high - self.low)
         sharp = round_ones[last + 1] == round_ones[first]
-        held = np.abs(missed) < FEATURE_RESIDUAL_SDS * noise
-        between = (p > places[first, None]) & (p < places[last, None])
-        no_face = (between & held).sum(axis=1) < 0.5 * between.sum(axis=1)
-        like_a_wall = sharp & ((places[last] - places[first] < self.tip_radius + cell) | no_face)
-        return bool((like_a_wall & (turned < FEATURE_RESIDUAL_SDS * noise)).any())
+        climb = sharp & (places[last] - places[first] < SHORTEST_BEND * self.tip_radius + cell)
+        return bool((climb & (turned < FEATURE_RESIDUAL_SDS * noise)).any())
 
     def outline(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(K,) places along the section, heights and sines: corners, and places of each arc; a kink is many in one."""
@@ -167,7 +158,7 @@ def extrusion(cloud: Cloud) -> Fitted | None:
     onward = np.diff(cloud.sweep) == 0
     cell = float(np.median(np.linalg.norm(np.diff(cloud.points, axis=0)[onward], axis=1))) if onward.any() else 0.0
     missed = _missed(theta, cloud.points, cloud.tip_radius)
-    if not section.possible or section.steps(cloud.points @ frame[0], missed, cloud.scale, cell):
+    if not section.possible or section.steps(cloud.scale, cell):
         return None
     return Fitted(
         "extrusion",

@@ -23,17 +23,18 @@ from mapping.base.quadrics import (
 )
 from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit, robust_scale
 
-# Cells whose heights are compared lie this share of the cloud's extent apart. Of a staircase of n edges, n eighths of
-# the pairs stand on two levels: the sum of absolute residuals finds the slope as long as these are less than half, that
-# is up to three edges one way; nearer pairs tell less of the slope
-PAIRS_APART = 1 / 8
+# Cells whose heights are compared lie the first of these shares of the cloud's extent apart that tells the slope: by it
+# several levels are found, or one that holds most cells. Of a staircase of n edges, n eighths of the pairs an eighth
+# apart stand on two levels: the sum of absolute residuals finds the slope as long as these are less than half, that is
+# up to three edges one way. Nearer pairs tell less of it, but beside as many edges as there may be levels
+PAIRS_APART = (1 / 8, 1 / 16, 1 / 32)
 # Of all cells so many must have a partner. Where lines are so far apart that it must be half the extent away, or all of
 # it between two, half of the cells can have one at most; a fifth of these may lie off the path
 FEWEST_PAIRS = 0.4
 # Of a run's samples, the share that is its end: the detail itself lies in the middle, and a median minds nothing that
 # reaches into less than half of an end
 END_SHARE = 8
-# More levels than that have no two cells PAIRS_APART of the extent from each other on one of them
+# More levels than that have no two cells an eighth of the extent from each other on one of them
 MOST_LEVELS = 8
 # Mean square, in standard deviations, up to which what lies about a height (FEATURE_RESIDUAL_SDS to either side) is as
 # likely to scatter about it as to lie anywhere there: 2 log(2 FEATURE_RESIDUAL_SDS / sqrt(2 pi)). Of a level it is 1,
@@ -86,20 +87,30 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
     beyond the pairs' distance), and as many count as are independent then: roughness and drift are no levels, however
     smooth from cell to cell.
     """
+    for apart in PAIRS_APART:
+        pairs = _pairs(cloud, apart)
+        if pairs is None:
+            return None
+        fit, held = _by_pairs(design, kind, cloud, *pairs)
+        if fit is not None or held > 0.5:
+            return fit
+    return None
+
+
+def _by_pairs(design: Design, kind: str, cloud: Cloud, one: IntArray, other: IntArray) -> tuple[Fitted | None, float]:
+    """The field whose slopes are those between cells (P,) and others (P,), None where one level is enough, and the
+    share of all cells that its fullest level holds to begin with."""
     x, y, z = cloud.points.T
     columns = design(x, y)
-    pairs = _pairs(cloud)
-    if pairs is None:
-        return None
-    one, other = pairs
     # what differences cannot tell, the constant, comes out as zero: the levels hold it
     slopes = robust_fit(columns[one] - columns[other], z[one] - z[other], np.sqrt(2.0) * cloud.scale).coefficients
     rest = z - columns @ slopes
     paired = max(cloud.scale, robust_scale(rest[one] - rest[other]) / np.sqrt(2.0))
     levels = _levels(rest, cloud, paired)
+    held = float(np.mean(levels.level == 0))
     for _ in range(LEVEL_ROUNDS):
         if len(levels.heights) < 2:
-            return None
+            return None, held
         on = np.maximum(levels.level, 0)
         fit = robust_fit(columns, z - levels.heights[on], cloud.scale)
         before, rest = levels, z - columns @ fit.coefficients
@@ -107,24 +118,25 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
         if np.array_equal(before.level, levels.level):
             break
     if len(levels.heights) < 2:
-        return None
+        return None, held
     on = np.maximum(levels.level, 0)
     lowered = replace(cloud, points=np.column_stack([x, y, z - levels.heights[on]]))
     flat = height_field(design, kind, lowered)
     # along the field's normal in the middle, not along the axis of a cloud that the step itself tilts
     slope = np.asarray(flat.parameters["coefficients"], dtype=np.float64)[1:3]
     heights = levels.heights / np.sqrt(1.0 + slope @ slope)
-    return replace(
+    terraces = replace(
         flat,
         parameters=flat.parameters | {"levels": heights.tolist()},
         freedom=flat.freedom + levels.freedom,
         # rows that each stand on a level of their own may be those of any body
         explains=levels.edges >= len(levels.heights) - 1,
     )
+    return terraces, held
 
 
-def _pairs(cloud: Cloud) -> tuple[IntArray, IntArray] | None:
-    """Cells (P,) and those (P,) that lie PAIRS_APART of the extent from them along x and along y, or farther.
+def _pairs(cloud: Cloud, apart: float) -> tuple[IntArray, IntArray] | None:
+    """Cells (P,) and those (P,) that lie a share of the extent from them along x and along y, or farther.
 
     None if there are too few of them along one of the two: then each line could stand on a level of its own.
     """
@@ -134,7 +146,7 @@ def _pairs(cloud: Cloud) -> tuple[IntArray, IntArray] | None:
     tree, extent = cKDTree(flat), np.ptp(flat, axis=0)
     one, other = [], []
     for axis in range(2):
-        for share in (PAIRS_APART, 2 * PAIRS_APART, 4 * PAIRS_APART, 8 * PAIRS_APART):
+        for share in apart * 2.0 ** np.arange(round(-np.log2(apart)) + 1):
             away = np.zeros(2)
             away[axis] = share * extent[axis]
             distance, found = tree.query(flat + away)

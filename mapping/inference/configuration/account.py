@@ -241,11 +241,11 @@ def _improved(
     odds = _told(found)
     noted = tuple(note for note, is_so in ((ENDED_EARLY, found.bounded), (UNEXPLAINED, not found.best.fits)) if is_so)
     odds = odds if found.best.fits else ()  # among configurations that are all wrong none is probable
-    # a section or a course alone is the posterior's to choose
     adds = len(found.best.kinds) > len(found.start.kinds)
-    if (adds and not found.best.fits and not _pays_beside_misfit(found)) or (
-        set(found.accepted) <= CHOSEN_LATER and found.best.kinds == found.start.kinds
-    ):
+    # a section or a course alone is the posterior's to choose, but where it begins decides what it finds
+    solves = found.best.fits and not found.start.fits
+    later = set(found.accepted) <= CHOSEN_LATER and found.best.kinds == found.start.kinds and not solves
+    if later or (adds and not found.best.fits and not _pays_beside_misfit(found)):
         laid = _bent_as_fitted(group, found.start, around)
         felt = [_felt_by_runs(feature, found.start.runs(k)) for k, feature in enumerate(laid)]
         return [_with_odds(feature, odds, noted) for feature in felt], found.best
