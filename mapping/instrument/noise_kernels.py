@@ -16,6 +16,9 @@ from numba import njit
 SETTLED = 1e-10
 # Readings of the first run whose covariances are kept, for runs that are like it no further.
 REMEMBERED = 2048
+# Series that are whitened side by side: each waits for its own last state, and the others need not wait with it. Eight
+# take a third of the time (two fifths with two states), three as long as one after the other
+LANES, WORTH_LANES = 8, 4
 
 
 @njit(cache=True, error_model="numpy")
@@ -118,30 +121,75 @@ def gains(kind, begins, known, observe, spread, shared, carry, turn, fresh, powe
 @njit(cache=True, nogil=True, error_model="numpy")
 def innovations(values, kind, begins, observe, carry, turn, gain, scale):  # type: ignore[no-untyped-def]
     """(W, N) innovations over their standard deviations of W series (W, N); 0 where nothing is read."""
+    series = len(values)
+    out = np.zeros(values.shape)
+    first = 0
+    while series - first >= WORTH_LANES:
+        last = min(first + LANES, series)
+        _side_by_side(values[first:last], kind, begins, observe, carry, turn, gain, scale, out[first:last])
+        first = last
+    for w in range(first, series):
+        _alone(values[w], kind, begins, observe, carry, turn, gain, scale, out[w])
+    return out
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _alone(values, kind, begins, observe, carry, turn, gain, scale, out):  # type: ignore[no-untyped-def]
+    """`innovations` of one series (N,), written to zeros (N,)."""
+    states, pairs = observe.shape[1], turn.shape[1]
+    state = np.zeros(states)
+    for i in range(len(values)):
+        k = kind[i]
+        if begins[i]:
+            state[:] = 0.0
+        error = 0.0
+        if scale[i] > 0.0:
+            error = values[i]
+            for a in range(states):
+                error -= observe[k, a] * state[a]
+            out[i] = error * scale[i]
+        for p in range(pairs):
+            x, y = state[2 * p], state[2 * p + 1]
+            state[2 * p] = carry[k, 2 * p] * x + turn[k, p] * y
+            state[2 * p + 1] = carry[k, 2 * p] * y - turn[k, p] * x
+        for a in range(2 * pairs, states):
+            state[a] *= carry[k, a]
+        for a in range(states):
+            state[a] += gain[i, a] * error
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _side_by_side(values, kind, begins, observe, carry, turn, gain, scale, out):  # type: ignore[no-untyped-def]
+    """`innovations` of up to LANES series (W, N), written to zeros (W, N): the same as of each alone, to the last
+    digit."""
     series, count = values.shape
     states, pairs = observe.shape[1], turn.shape[1]
-    out = np.zeros((series, count))
-    state = np.zeros(states)
-    for w in range(series):
-        for i in range(count):
-            k = kind[i]
-            if begins[i]:
-                state[:] = 0.0
-            error = 0.0
-            if scale[i] > 0.0:
-                error = values[w, i]
-                for a in range(states):
-                    error -= observe[k, a] * state[a]
-                out[w, i] = error * scale[i]
-            for p in range(pairs):
-                x, y = state[2 * p], state[2 * p + 1]
-                state[2 * p] = carry[k, 2 * p] * x + turn[k, p] * y
-                state[2 * p + 1] = carry[k, 2 * p] * y - turn[k, p] * x
-            for a in range(2 * pairs, states):
-                state[a] *= carry[k, a]
+    state, error = np.zeros((states, LANES)), np.zeros(LANES)
+    for i in range(count):
+        k = kind[i]
+        if begins[i]:
+            state[:] = 0.0
+        if scale[i] > 0.0:
+            for w in range(series):
+                error[w] = values[w, i]
             for a in range(states):
-                state[a] += gain[i, a] * error
-    return out
+                for w in range(LANES):
+                    error[w] -= observe[k, a] * state[a, w]
+            for w in range(series):
+                out[w, i] = error[w] * scale[i]
+        else:
+            error[:] = 0.0
+        for p in range(pairs):
+            for w in range(LANES):
+                x, y = state[2 * p, w], state[2 * p + 1, w]
+                state[2 * p, w] = carry[k, 2 * p] * x + turn[k, p] * y
+                state[2 * p + 1, w] = carry[k, 2 * p] * y - turn[k, p] * x
+        for a in range(2 * pairs, states):
+            for w in range(LANES):
+                state[a, w] *= carry[k, a]
+        for a in range(states):
+            for w in range(LANES):
+                state[a, w] += gain[i, a] * error[w]
 
 
 @njit(cache=True)

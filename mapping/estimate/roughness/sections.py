@@ -56,7 +56,10 @@ def _drawn(table: FloatArray) -> FloatArray:
 
 def moments(heights: FloatArray) -> FloatArray:
     """(5,) number of heights, sums of their absolute values, squares, third and fourth powers."""
-    return np.array([len(heights), np.abs(heights).sum(), *[(heights**power).sum() for power in (2, 3, 4)]])
+    square = heights * heights  # the third and fourth powers of numpy take thirty times as long as products
+    return np.array(
+        [len(heights), np.abs(heights).sum(), square.sum(), (square * heights).sum(), (square * square).sum()]
+    )
 
 
 def mean_size(sums: FloatArray) -> FloatArray:

@@ -283,38 +283,47 @@ def _normal_equations(moments, heights, columns, rows):  # type: ignore[no-untyp
         d += 1
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+@njit(cache=True, fastmath={"contract", "nsz"})
 def _cholesky(rows, columns):  # type: ignore[no-untyped-def]
     """Make R of the products of the columns, beside it the rotated heights and the first six rows of its inverse, each
     as a column. It ends with a zero on the diagonal where a column depends on those before it.
 
-    Two rows at a time, so that what is read serves both.
+    Two rows at a time and four by four, so that what is read and written serves several products. With terms
+    reassociated a product with a reciprocal becomes a division again, of every number of the row.
     """
     for j in range(0, columns, 2):
-        one, other = rows[j], rows[j + 1]
-        for k in range(0, j, 2):
-            a, b, c, d = rows[k, j], rows[k + 1, j], rows[k, j + 1], rows[k + 1, j + 1]
+        one, other, k = rows[j], rows[j + 1], 0
+        while k + 3 < j:
+            w, x, y, z = rows[k], rows[k + 1], rows[k + 2], rows[k + 3]
+            a, b, c, d = w[j], x[j], y[j], z[j]
+            e, f, g, h = w[j + 1], x[j + 1], y[j + 1], z[j + 1]
             for i in range(EQUATION):
-                x, y = rows[k, i], rows[k + 1, i]
-                one[i] -= a * x + b * y
-                other[i] -= c * x + d * y
+                one[i] -= a * w[i] + b * x[i] + c * y[i] + d * z[i]
+                other[i] -= e * w[i] + f * x[i] + g * y[i] + h * z[i]
+            k += 4
+        if k < j:
+            w, x = rows[k], rows[k + 1]
+            a, b, e, f = w[j], x[j], w[j + 1], x[j + 1]
+            for i in range(EQUATION):
+                one[i] -= a * w[i] + b * x[i]
+                other[i] -= e * w[i] + f * x[i]
         if not one[j] > 0.0:
             one[j] = 0.0
             return
-        a = 1.0 / np.sqrt(one[j])
-        for i in range(EQUATION):
-            one[i] *= a
-        if j + 1 == columns:
-            return
-        c = one[j + 1]
-        for i in range(EQUATION):
-            other[i] -= c * one[i]
-        if not other[j + 1] > 0.0:
+        a, left = 1.0 / np.sqrt(one[j]), 0.0
+        if j + 1 < columns:
+            c = one[j + 1] * a
+            left = other[j + 1] - c * c
+        if not left > 0.0:
+            for i in range(EQUATION):
+                one[i] *= a
             other[j + 1] = 0.0
             return
-        a = 1.0 / np.sqrt(other[j + 1])
+        b = 1.0 / np.sqrt(left)
         for i in range(EQUATION):
-            other[i] *= a
+            first = one[i] * a
+            one[i] = first
+            other[i] = (other[i] - c * first) * b
 
 
 @njit(cache=True)
@@ -533,7 +542,7 @@ def pooled_bias(operators, deviations, pools, reaches, sizes, certainty, out):  
                             # beyond what noise does at one point, its own gap needs no company
                             expected = max(its + (own if other > s else -own), LEAST_SQUARED_ERROR)
                             worst = max(worst, _gap(parts, s, d, other, higher, 0) - CERTAIN_GAP * expected)
-                        if members > 0.0:
+                        if excess > worst * weight:  # else nothing is above the worst, whatever the allowance
                             # neighbourhoods overlap: the pool holds fewer independent values than points
                             independent = 1.0 + INDEPENDENT_SHARE * reaches[level] * (members - 1.0) / (
                                 pool * sizes[other]

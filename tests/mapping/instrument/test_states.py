@@ -90,3 +90,15 @@ def test_a_term_of_no_level_or_length_is_refused_by_name():
     for values in ((0.0, 1.0), (1.0, 0.0), (1.0, np.inf), (1.0, 1.0, 0.0)):
         with pytest.raises(NoiseError, match="positive"):
             Term(*values)
+
+
+@pytest.mark.parametrize("count", [3, 4, 8, 11, 17])
+def test_series_that_are_whitened_together_are_as_each_alone_to_the_last_digit(count):
+    rng = np.random.default_rng(2)
+    bins, steps = 60, mean_steps(SEVERAL.terms, np.array([0.01, 0.03]), np.full(2, 2e-3))
+    kind, known = rng.integers(0, 2, bins), rng.random(bins) > 0.1
+    filter_ = steps.filter(kind, np.arange(bins) % 25 == 0, known)
+    values = rng.standard_normal((count, bins))
+    together = filter_.whiten(values)
+    np.testing.assert_array_equal(together, np.concatenate([filter_.whiten(each[None]) for each in values]))
+    assert not together[:, ~known].any()
