@@ -250,7 +250,8 @@ class Explore:
             for which, end in enumerate(track.ends):
                 if (index, which) in found.sharpened or not self._is_doubtful(end, track):
                     continue
-                seconds = 4.0 * track.half_width / self.speed
+                way = float(np.linalg.norm(end.point - surveyor.felt[-1].centers[-1]))
+                seconds = 4.0 * track.half_width / self.speed + way / self._travel_speed
                 gain = end.sd if np.isfinite(end.sd) else self.survey.pitch
                 actions.append(Action("sharpen an end", gain, seconds, partial(self._sharpen, index, which, found)))
         return actions

@@ -12,7 +12,7 @@ from mapping import FloatArray, Trace
 from mapping.base import Base
 from mapping.instrument import Noise
 from planners.follow.axis_track import AxisEnd, AxisTrack, Slides
-from planners.follow.end_place import UNKNOWN_TURN, EndPlace, EndSection
+from planners.follow.end_place import OFFSETS, UNKNOWN_TURN, EndPlace, EndSection
 from planners.follow.recross import flattening
 from planners.follow.template_fit import FEWEST_FITTED, ShapeFit, end_shape, fit_shape
 from planners.paths import Strokes, tangential, to_and_fro
@@ -91,14 +91,17 @@ class EndFinder:
         return replace(end, point=onto, sd=fit.sd, reason="end", heading=heading, reach=0.0)
 
     def sharpen(self, end: AxisEnd, crest: Crest, wanted: tuple[float, float]) -> Generator[Move, Trace, AxisEnd]:
-        """The place of an end by sweeps to and fro across the line, each where it tells the most per second of what is
-        still wanted; the end as it was if they do not show it.
+        """The place of an end by sweeps to and fro across the line, those by which what is wanted is known the soonest;
+        the end as it was if they do not show it.
+
+        Beyond the end, places lie straight on: a line that bends has no bend where it is not, and what the ball feels
+        of its end is round about that.
 
         Args:
             wanted: standard deviations of the end's place along the line and across it, m.
         """
         half, enough = self._half(crest), np.array(wanted)
-        about = _Course.about(self.strokes, end, half, half)
+        about = _Course.about(self.strokes, end, half, OFFSETS[-1] * half, straight_on=True)
         # of an end that no slide showed it is known as far as where the crest was gone
         along_sd = end.sd if np.isfinite(end.sd) else max(end.reach, half)
         place = EndPlace(
@@ -107,20 +110,22 @@ class EndFinder:
             np.array([0.0, 0.0, 0.0, crest.height]),
             np.array([along_sd, half, UNKNOWN_TURN, crest.height_sd]),
         )
-        here, made, useless = 0.0, 0, set[float]()
+        made, useless = 0, set[float]()
         while made < MOST_PASSES and place.fits and (place.sd[:2] > enough).any():
             could = [each for each in place.sweeps(SAMPLES_APART * half) if about.holds(each.offset)]
             could = [each for each in could if each.offset not in useless]
             if not could:
                 break
-            seconds = [(abs(each.offset - here) + PASSES * 2.0 * each.half) / self.strokes.speed for each in could]
-            gains = [place.gain(each, PASSES, enough) for each in could]
-            sweep = could[int(np.argmax(np.divide(gains, seconds)))]
+            seconds = np.array([2.0 * each.half for each in could]) / self.strokes.speed
+            chosen, foretold = place.next(could, seconds, enough)
+            sweep = could[chosen]
+            # what is foretold changes with what is felt
+            passes = PASSES * max(1, round(0.5 * foretold / PASSES))
             middle, heading = about.at(sweep.offset)
             left = np.cross(self.strokes.onto(middle)[1], heading)
-            traces = yield from to_and_fro(self.strokes.line(middle, left, sweep.half, sweep.half), PASSES)
-            here, made = sweep.offset, made + PASSES
-            if sum(map(len, traces)) < FEWEST_FITTED:
+            traces = yield from to_and_fro(self.strokes.line(middle, left, sweep.half, sweep.half), passes)
+            made += passes
+            if sum(map(len, traces)) < FEWEST_FITTED * passes // PASSES:
                 useless.add(sweep.offset)
                 continue
             for trace in traces:
@@ -180,10 +185,12 @@ class _Course:
     along: FloatArray
 
     @classmethod
-    def about(cls, strokes: Strokes, end: AxisEnd, before: float, beyond: float) -> _Course:
-        """From so far before the end to so far beyond it, m."""
+    def about(
+        cls, strokes: Strokes, end: AxisEnd, before: float, beyond: float, *, straight_on: bool = False
+    ) -> _Course:
+        """From so far before the end to so far beyond it, m; on along the line's bend, or straight."""
         back = strokes.walk(end.point, -end.heading, before, -end.turn)
-        ahead = strokes.walk(end.point, end.heading, beyond, end.turn)
+        ahead = strokes.walk(end.point, end.heading, beyond, 0.0 if straight_on else end.turn)
         points = np.concatenate([back.points[:0:-1], ahead.points])
         normals = np.concatenate([back.normals[:0:-1], ahead.normals])
         return cls(points, normals, np.concatenate([-back.along[:0:-1], ahead.along]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,9 +25,19 @@ WANTED = (25e-6, 30e-6)
 
 
 def found(
-    end: AxisEnd, seed: int, *, scene: BenchScene = SCENE, slides: bool = False, pecks: int = 0
+    end: AxisEnd,
+    seed: int,
+    *,
+    scene: BenchScene = SCENE,
+    slides: bool = False,
+    pecks: int = 0,
+    lying: float = 0.0,
 ) -> tuple[AxisEnd, int]:
-    """The end after a slide or after sweeps across, of so many pecks each, and the number of the sweeps."""
+    """The end after a slide or after sweeps across, of so many pecks each, and the number of the sweeps.
+
+    Every sweep's heights lie off by a constant of a standard deviation (m).
+    """
+    rng = np.random.default_rng(seed)
     finger = SimulatedFinger(object=scene.object, tip_radius=R, rate=2000.0, white=1e-4, correlated=1e-5, seed=seed)
     base = Base(scene.base)
     finder = EndFinder(Strokes(base, R), base, Noise(1e-4, 1e-5, 1e-3))
@@ -33,6 +45,7 @@ def found(
     move, count = next(plan), 0
     while True:
         trace = finger.execute(move)
+        trace = replace(trace, centers=trace.centers + np.array([0.0, 0.0, lying * rng.standard_normal()]))
         count += 1
         try:
             move = plan.send(trace.select(np.linspace(0, len(trace) - 1, pecks).astype(int)) if pecks else trace)
@@ -68,6 +81,26 @@ def test_sweeps_across_tell_the_end_along_the_line_and_across_as_well_as_asked()
         scores.append((end.point - END)[:2] / [end.sd, end.across_sd])
     # sixteen draws: the standard error of their standard deviation is 0.18
     assert np.abs(np.mean(scores, axis=0)).max() < 1.1 and 0.45 < np.std(scores) < 1.6
+
+
+def test_sweeps_that_lie_off_their_base_tell_an_end_as_the_model_does() -> None:
+    """The model gives every sweep an offset and a slope; taken for the line's, 0.02 mm moved its end by 0.04 mm."""
+    ends = [found(supposed(1e-4, -1e-4), seed, lying=20e-6)[0] for seed in range(6)]
+    scores = [(end.point - END)[:2] / [end.sd, end.across_sd] for end in ends]
+    # twelve draws: the standard error of their standard deviation is 0.2
+    assert np.sqrt(np.mean(np.square(scores))) < 1.6
+
+
+def test_an_end_of_a_line_that_bends_is_found_across_it() -> None:
+    scene = SCENES["curved"](np.random.default_rng(20))
+    axis = scene.truth[0].axis
+    way = (axis[-1] - axis[-2]) / np.linalg.norm(axis[-1] - axis[-2])
+    left = np.cross([0.0, 0.0, 1.0], way)
+    turn = float(np.sign((axis[-10] - axis[-1]) @ left)) / 0.015
+    ends = [found(AxisEnd(axis[-1], 1e-4, "end", way, turn=turn), seed, scene=scene)[0] for seed in range(3)]
+    scores = [(end.point - axis[-1]) @ left / end.across_sd for end in ends]
+    # its course bent on beyond the end it was 5 standard deviations off
+    assert np.abs(scores).max() < 3.0
 
 
 def test_pecks_tell_the_end_as_sweeps_do() -> None:
