@@ -351,8 +351,9 @@ class Explore:
         found.sharpened.add((index, which))
         track = found.tracks[index]
         finder = EndFinder(self.strokes, self.base, found.noise or Noise(0.0))
-        end = yield from finder.sharpen(track.ends[which], Crest.of(track), self._enough(track))
-        found.tracks[index] = track.with_end(which, end)
+        end, crest = yield from finder.sharpen(track.ends[which], Crest.of(track), self._enough(track))
+        # what one end tells of the height need not be felt at the other
+        found.tracks[index] = replace(track, height=crest.height, height_sd=crest.height_sd).with_end(which, end)
         return Outcome(end.reason, f"end known to {length_text(end.sd)} along, {length_text(end.across_sd)} across")
 
 

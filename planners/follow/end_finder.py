@@ -90,9 +90,11 @@ class EndFinder:
         onto = self.strokes.onto(where)[0]
         return replace(end, point=onto, sd=fit.sd, reason="end", heading=heading, reach=0.0)
 
-    def sharpen(self, end: AxisEnd, crest: Crest, wanted: tuple[float, float]) -> Generator[Move, Trace, AxisEnd]:
+    def sharpen(
+        self, end: AxisEnd, crest: Crest, wanted: tuple[float, float]
+    ) -> Generator[Move, Trace, tuple[AxisEnd, Crest]]:
         """The place of an end by sweeps to and fro across the line, those by which what is wanted is known the soonest;
-        the end as it was if they do not show it.
+        the end as it was if they do not show it. And the ridge, with its height as it is known then.
 
         Beyond the end, places lie straight on: a line that bends has no bend where it is not, and what the ball feels
         of its end is round about that.
@@ -111,7 +113,7 @@ class EndFinder:
             np.array([along_sd, half, UNKNOWN_TURN, crest.height_sd]),
         )
         made, useless = 0, set[float]()
-        while made < MOST_PASSES and place.fits and (place.sd[:2] > enough).any():
+        while made < MOST_PASSES and place.fits and place.within(half) and (place.sd[:2] > enough).any():
             could = [each for each in place.sweeps(SAMPLES_APART * half) if about.holds(each.offset)]
             could = [each for each in could if each.offset not in useless]
             if not could:
@@ -119,8 +121,8 @@ class EndFinder:
             seconds = np.array([2.0 * each.half for each in could]) / self.strokes.speed
             chosen, foretold = place.next(could, seconds, enough)
             sweep = could[chosen]
-            # what is foretold changes with what is felt
-            passes = PASSES * max(1, round(0.5 * foretold / PASSES))
+            # what is foretold changes with what is felt: no more than was made before is made before the next look
+            passes = PASSES * max(1, round(min(0.5 * foretold, made) / PASSES))
             middle, heading = about.at(sweep.offset)
             left = np.cross(self.strokes.onto(middle)[1], heading)
             traces = yield from to_and_fro(self.strokes.line(middle, left, sweep.half, sweep.half), passes)
@@ -132,14 +134,15 @@ class EndFinder:
                 feet = self.base.foot(trace.centers, self.strokes.tip_radius)
                 place.learn(sweep, (feet.points - middle) @ left, feet.height)
             place.solve()
-        along, across, _, height = place.place
+        along, across, _, height = place.place.tolist()
         known = bool((place.sd[:2] <= enough).all())
         shown = place.felt and (place.fits or known)
-        if not shown or max(abs(along), abs(across)) > half or height < 0.4 * crest.height:
-            return end
+        if not shown or not place.within(half) or height < 0.4 * crest.height:
+            return end, crest
         where, heading = about.at(along)
         point = self.strokes.onto(where + across * np.cross(self.strokes.onto(where)[1], heading))[0]
-        return replace(end, point=point, sd=float(place.sd[0]), across_sd=float(place.sd[1]), heading=heading)
+        sharp = replace(end, point=point, sd=float(place.sd[0]), across_sd=float(place.sd[1]), heading=heading)
+        return sharp, replace(crest, height=height, height_sd=float(place.sd[3]))
 
     def _section(self, end: AxisEnd, crest: Crest, half: float, about: _Course) -> EndSection:
         """What the trace looks like about an end of a line with such a course."""

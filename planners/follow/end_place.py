@@ -60,7 +60,8 @@ class EndSection:
         high = max(float(place[3]), 0.0)
         thin = np.sqrt(2.0 * self.tip_radius * high) / (wide * self.half_width)
         du, dv = u - place[0], v - place[1]
-        along, across = du + (place[2] + self.shear) * dv, dv - place[2] * du
+        cosine, sine = np.cos(place[2]), np.sin(place[2])
+        along, across = cosine * du + (sine + self.shear) * dv, cosine * dv - sine * du
         return end_heights(long * along, thin * wide * across, high, self.sign, self.tip_radius)
 
     def derivatives(self, u: FloatArray, v: FloatArray, place: FloatArray) -> FloatArray:
@@ -114,6 +115,10 @@ class EndPlace:
     def felt(self) -> bool:
         """True if any pass told of it."""
         return bool(self._felt)
+
+    def within(self, reach: float) -> bool:
+        """True if the end lies no farther from where it was first found, along and across, m."""
+        return bool(np.abs(self.place[:2]).max() <= reach)
 
     def sweeps(self, spacing: float) -> list[Across]:
         """All sweeps that could be made, with samples so far apart, m; what each tells, by what is known by now."""

@@ -50,7 +50,7 @@ def found(
         try:
             move = plan.send(trace.select(np.linspace(0, len(trace) - 1, pecks).astype(int)) if pecks else trace)
         except StopIteration as done:
-            return done.value, count
+            return (done.value if slides else done.value[0]), count
 
 
 def supposed(along: float, across: float) -> AxisEnd:
