@@ -12,7 +12,7 @@ from planners.follow.template_fit import covariance_of_means, end_heights, means
 
 # Where sweeps may cross the line, in half-widths of its disturbance beyond the end: those closer to each other tell the
 # same; and how far beyond the end, as it is known by now, the ball still feels enough of it
-OFFSETS, FARTHEST = np.array([-1.0, -0.75, -0.5, -0.25, *np.arange(0.0, 1.41, 0.1)]), 0.95
+OFFSETS, FARTHEST_SWEEP = np.array([-1.0, -0.75, -0.5, -0.25, *np.arange(0.0, 1.41, 0.1)]), 0.95
 # Bare base that a sweep takes in beside the disturbance, in half-widths
 BARE_MARGIN = 0.3
 # Bins of a sweep that was not made yet; and the step of a derivative, in half-widths, heights and rad
@@ -22,8 +22,8 @@ FORETOLD_BINS, DERIVATIVE_STEP = 40, 1e-3
 VAGUE = 3.0
 # Shares of the time that two sweeps may have, to be made in turn until enough is known; and how long that may take, in
 # times of the shortest one
-SHARES = np.array([0.25, 0.5, 0.75])
-FORETOLD = 2.0 * 1.4 ** np.arange(16)
+TIME_SHARES = np.array([0.25, 0.5, 0.75])
+FORETOLD_TIMES = 2.0 * 1.4 ** np.arange(16)
 # Standard deviations of chi-squared beyond which something else is felt than a line that ends
 MISFIT_SDS = 5.0
 # By how much a line may turn where it ends, of which nothing is felt before: standard deviation, rad
@@ -123,7 +123,7 @@ class EndPlace:
     def sweeps(self, spacing: float) -> list[Across]:
         """All sweeps that could be made, with samples so far apart, m; what each tells, by what is known by now."""
         half_width, made = self.section.half_width, []
-        near = OFFSETS * half_width <= self.place[0] + FARTHEST * self.section.beyond
+        near = OFFSETS * half_width <= self.place[0] + FARTHEST_SWEEP * self.section.beyond
         for offset in OFFSETS[near] * half_width:
             gone = min(max(offset - self.place[0], 0.0) / self.section.beyond, 1.0) if self.section.sign > 0 else 0.0
             half = (float(np.sqrt(1.0 - gone**2)) + BARE_MARGIN) * half_width
@@ -146,12 +146,12 @@ class EndPlace:
         """
         count = len(sweeps)
         one, other = np.triu_indices(count, 1)
-        first = np.concatenate([np.arange(count), np.tile(one, len(SHARES))])
-        second = np.concatenate([np.arange(count), np.tile(other, len(SHARES))])
-        share = np.concatenate([np.ones(count), np.repeat(SHARES, len(one))])
+        first = np.concatenate([np.arange(count), np.tile(one, len(TIME_SHARES))])
+        second = np.concatenate([np.arange(count), np.tile(other, len(TIME_SHARES))])
+        share = np.concatenate([np.ones(count), np.repeat(TIME_SHARES, len(one))])
         rates = np.array([each.told for each in sweeps]) / seconds[:, None, None]
         rate = share[:, None, None] * rates[first] + (1.0 - share)[:, None, None] * rates[second]
-        times = FORETOLD * seconds.min()
+        times = FORETOLD_TIMES * seconds.min()
         known = np.linalg.inv(self._told + times[:, None, None, None] * rate)
         short = (known[..., [0, 1], [0, 1]] / enough**2).max(axis=2)
         reached = short.min(axis=1) <= 1.0
