@@ -151,8 +151,17 @@ class EndFinder:
         beside = _Course.about(self.strokes, replace(end, heading=left, turn=0.0), half, half)
         # centres are |I + r II| apart: where the base is twisted, what is nearest to a place beside the line lies ahead
         twist = float((about.normals[-1] - about.normals[0]) @ left / (about.along[-1] - about.along[0]))
-        wide = about.flattening(tip), beside.flattening(tip)
-        return EndSection(crest.sign, half, tip, wide, twist * tip / wide[0] ** 2)
+        wide = about.flattening(self._round(crest)), beside.flattening(self._round(crest))
+        return EndSection(crest.sign, half, tip, wide, twist * self._round(crest) / wide[0] ** 2)
+
+    def _round(self, crest: Crest) -> float:
+        """Radius about which the ball goes round a body of curvature k beside an end, m.
+
+        Over a cap whose middle stands c and whose top H over the base, the ball's centre falls as over a flat base
+        whose lengths are stretched by the root of (1 + k c) (1 + k (r + H)): with c = H / 2, to first order in H / r,
+        of 1 + k (r + 3/2 H). In a groove it rests on the base beside it.
+        """
+        return self.strokes.tip_radius + (1.5 * crest.height if crest.sign > 0 else 0.0)
 
     def _half(self, crest: Crest) -> float:
         """Half-width of the disturbance about an end, m: a groove is crossed no more where its end lifts the ball."""
@@ -165,7 +174,7 @@ class EndFinder:
         # the correlated part of the noise averages out over the slides, not along them
         noise = self.noise.of_passes(felt.count)
         shape = end_shape(crest.sign, self.strokes.tip_radius)
-        wide = about.flattening(self.strokes.tip_radius)
+        wide = about.flattening(self._round(crest))
         fit = fit_shape(
             wide * place[order],
             felt.heights[order],
@@ -208,9 +217,9 @@ class _Course:
         k = int(np.clip(np.searchsorted(self.along, place), 1, len(self.points) - 1))
         return where, tangential(self.points[k] - self.points[k - 1], self.normals[k])
 
-    def flattening(self, tip_radius: float) -> float:
-        """By how much shapes along it are narrower than on a flat base."""
-        return flattening(self.along, self.normals, self.points[-1] - self.points[0], tip_radius)
+    def flattening(self, radius: float) -> float:
+        """By how much shapes along it are narrower than on a flat base, for a ball that goes round it so far off, m."""
+        return flattening(self.along, self.normals, self.points[-1] - self.points[0], radius)
 
 
 def places_along(points: FloatArray, line: FloatArray, along: FloatArray) -> FloatArray:
