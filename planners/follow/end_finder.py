@@ -165,7 +165,9 @@ class EndFinder:
 
     def _half(self, crest: Crest) -> float:
         """Half-width of the disturbance about an end, m: a groove is crossed no more where its end lifts the ball."""
-        return max(crest.half_width, float(np.sqrt(2.0 * self.strokes.tip_radius * crest.height)))
+        widest = float(np.sqrt(2.0 * self.strokes.tip_radius * crest.height))
+        # that of a ridge is narrower where the base is bent, and by that it is told how wide the ridge itself is
+        return crest.half_width if crest.sign > 0 else max(crest.half_width, widest)
 
     def _fitted(self, felt: Slides, about: _Course, crest: Crest, last: float) -> ShapeFit:
         """The end's place on its course, from all slides laid over each other."""
