@@ -434,8 +434,15 @@ def cylinder(cloud: Cloud) -> Fitted | None:
         def residual(q: FloatArray, axis: int = axis, across: list[int] = across) -> FloatArray:
             return np.asarray(np.linalg.norm(_across(p, q, axis, across), axis=1) - q[4])
 
+        def slopes(q: FloatArray, axis: int = axis, across: list[int] = across) -> FloatArray:
+            away = _across(p, q, axis, across)
+            distance = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny)
+            side, foot = away[:, across] / distance, (p - away)[:, axis, None]
+            return np.column_stack([-side, -foot * side, -np.ones(len(p))])
+
         scale = max(cloud.scale, 1e-9 * radius)
-        found = least_squares(residual, [start[0], start[1], 0.0, 0.0, radius], loss="soft_l1", f_scale=scale)
+        begin = [start[0], start[1], 0.0, 0.0, radius]
+        found = least_squares(residual, begin, jac=slopes, loss="soft_l1", f_scale=scale)
         misses = residual(found.x)
         cost = float(np.minimum((misses / cloud.floor) ** 2, FEATURE_RESIDUAL_SDS**2).sum())
         if best is None or cost < best[0]:
