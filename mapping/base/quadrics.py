@@ -21,6 +21,8 @@ BELOW = -0.6
 BENT_SCATTER_SHARE = 0.5
 # Cells that are asked for the body's normal: the median of so many knows the scatter to 5 %
 ASKED_FOR_NORMAL = 500
+# Of them so many at once: of speed alone, 8 and 16 take a third of the time that one by one does, 64 two thirds
+CELLS_AT_ONCE = 8
 # The path goes on beside itself where its way there is so many times the distance: beyond half a circle (pi / 2)
 OTHER_PASS = 2.0
 # Cosine of the least angle to the path at which a line to a neighbour tells the normal
@@ -147,15 +149,18 @@ def _normals(points: FloatArray, sweep: IntArray, at: IntArray, ways: FloatArray
     run = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     step = float(np.median(np.diff(run)))
     normals = np.full((len(at), 3), np.nan)
-    for row, (cell, way) in enumerate(zip(at, ways, strict=True)):
-        line = points - points[cell]
-        apart = np.linalg.norm(line, axis=1)
-        other = (sweep != sweep[cell]) | (np.abs(run - run[cell]) > OTHER_PASS * apart)
-        other &= (apart > 0.5 * step) & (np.abs(line @ way) < HALF_RIGHT * apart)
-        if other.any():
-            candidates = np.flatnonzero(other)
-            normal = np.cross(way, line[candidates[apart[candidates].argmin()]])
-            normals[row] = normal / np.linalg.norm(normal)
+    # a few at once: one by one the asking takes longer than the answer, all at once memory does
+    for some in np.split(np.arange(len(at)), np.arange(CELLS_AT_ONCE, len(at), CELLS_AT_ONCE)):
+        cell, way, row = at[some], ways[some], np.arange(len(some))
+        line = [points[:, axis] - points[cell, axis][:, None] for axis in range(3)]
+        apart = np.sqrt(sum(part**2 for part in line))
+        along = sum(part * way[:, axis, None] for axis, part in enumerate(line))
+        other = (sweep != sweep[cell, None]) | (np.abs(run - run[cell, None]) > OTHER_PASS * apart)
+        other &= (apart > 0.5 * step) & (np.abs(along) < HALF_RIGHT * apart)
+        nearest = np.where(other, apart, np.inf).argmin(axis=1)
+        known = other[row, nearest]
+        normal = np.cross(way, np.column_stack([part[row, nearest] for part in line]))[known]
+        normals[some[known]] = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     return normals
 
 
@@ -424,8 +429,15 @@ def cylinder(cloud: Cloud) -> Fitted | None:
         def residual(q: FloatArray, axis: int = axis, across: list[int] = across) -> FloatArray:
             return np.asarray(np.linalg.norm(_across(p, q, axis, across), axis=1) - q[4])
 
+        def slopes(q: FloatArray, axis: int = axis, across: list[int] = across) -> FloatArray:
+            away = _across(p, q, axis, across)
+            distance = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny)
+            side, foot = away[:, across] / distance, (p - away)[:, axis, None]
+            return np.column_stack([-side, -foot * side, -np.ones(len(p))])
+
         scale = max(cloud.scale, 1e-9 * radius)
-        found = least_squares(residual, [start[0], start[1], 0.0, 0.0, radius], loss="soft_l1", f_scale=scale)
+        begin = [start[0], start[1], 0.0, 0.0, radius]
+        found = least_squares(residual, begin, jac=slopes, loss="soft_l1", f_scale=scale)
         misses = residual(found.x)
         cost = float(np.minimum((misses / cloud.scale) ** 2, FEATURE_RESIDUAL_SDS**2).sum())
         if best is None or cost < best[0]:

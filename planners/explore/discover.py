@@ -12,6 +12,7 @@ from mapping import FloatArray, SurfaceError, Trace, TraceError, length_text
 from mapping.base import BASE_TRIANGLE_SIZE, FORETOLD, Base, Cells, fit_base, rolled_off, touched_part
 from planners import Outcome, Plan, PlannerError
 from planners.explore.feel_line import Felt, FeltLine, empty_at, facing
+from planners.explore.warm_up import get_ready
 from planners.survey import Survey
 
 APPROACH_SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -57,6 +58,7 @@ class Discover:
 
     def plan(self) -> Plan:
         """The outcome's value is the Base, or None if nothing was touched inside the box."""
+        get_ready(self.tip_radius)
         try:
             return (yield from self._everything())
         except (SurfaceError, TraceError) as error:
@@ -108,7 +110,7 @@ class Discover:
     def _fit(self, felt: Felt) -> Base:
         trace = Trace.concatenate(felt.traces)
         cells = Cells.of(trace, MOST_DISCOVERY_CELLS)
-        first = fit_base(cells.trace(self.tip_radius, np.ones(len(cells.sweep), dtype=bool)))
+        first = fit_base(cells.trace(self.tip_radius, np.ones(len(cells.sweep), dtype=bool)), tested=False)
         height = first.foot(cells.centers, self.tip_radius).height
         # where the ball rolled off the body's edges it does not tell how the body is curved
         kept = cells.trace(self.tip_radius, ~rolled_off(height, cells.sweep, self.tip_radius))

@@ -250,7 +250,8 @@ class Explore:
             for which, end in enumerate(track.ends):
                 if (index, which) in found.sharpened or not self._is_doubtful(end, track):
                     continue
-                seconds = 4.0 * track.half_width / self.speed
+                way = float(np.linalg.norm(end.point - surveyor.felt[-1].centers[-1]))
+                seconds = 4.0 * track.half_width / self.speed + way / self._travel_speed
                 gain = end.sd if np.isfinite(end.sd) else self.survey.pitch
                 actions.append(Action("sharpen an end", gain, seconds, partial(self._sharpen, index, which, found)))
         return actions
@@ -350,8 +351,9 @@ class Explore:
         found.sharpened.add((index, which))
         track = found.tracks[index]
         finder = EndFinder(self.strokes, self.base, found.noise or Noise(0.0))
-        end = yield from finder.sharpen(track.ends[which], Crest.of(track), self._enough(track))
-        found.tracks[index] = track.with_end(which, end)
+        end, crest = yield from finder.sharpen(track.ends[which], Crest.of(track), self._enough(track))
+        # what one end tells of the height need not be felt at the other
+        found.tracks[index] = replace(track, height=crest.height, height_sd=crest.height_sd).with_end(which, end)
         return Outcome(end.reason, f"end known to {length_text(end.sd)} along, {length_text(end.across_sd)} across")
 
 

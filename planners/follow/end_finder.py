@@ -12,7 +12,7 @@ from mapping import FloatArray, Trace
 from mapping.base import Base
 from mapping.instrument import Noise
 from planners.follow.axis_track import AxisEnd, AxisTrack, Slides
-from planners.follow.end_place import UNKNOWN_TURN, EndPlace, EndSection
+from planners.follow.end_place import OFFSETS, UNKNOWN_TURN, EndPlace, EndSection
 from planners.follow.recross import flattening
 from planners.follow.template_fit import FEWEST_FITTED, ShapeFit, end_shape, fit_shape
 from planners.paths import Strokes, tangential, to_and_fro
@@ -90,15 +90,20 @@ class EndFinder:
         onto = self.strokes.onto(where)[0]
         return replace(end, point=onto, sd=fit.sd, reason="end", heading=heading, reach=0.0)
 
-    def sharpen(self, end: AxisEnd, crest: Crest, wanted: tuple[float, float]) -> Generator[Move, Trace, AxisEnd]:
-        """The place of an end by sweeps to and fro across the line, each where it tells the most per second of what is
-        still wanted; the end as it was if they do not show it.
+    def sharpen(
+        self, end: AxisEnd, crest: Crest, wanted: tuple[float, float]
+    ) -> Generator[Move, Trace, tuple[AxisEnd, Crest]]:
+        """The place of an end by sweeps to and fro across the line, those by which what is wanted is known the soonest;
+        the end as it was if they do not show it. And the ridge, with its height as it is known then.
+
+        Beyond the end, places lie straight on: a line that bends has no bend where it is not, and what the ball feels
+        of its end is round about that.
 
         Args:
             wanted: standard deviations of the end's place along the line and across it, m.
         """
         half, enough = self._half(crest), np.array(wanted)
-        about = _Course.about(self.strokes, end, half, half)
+        about = _Course.about(self.strokes, end, half, OFFSETS[-1] * half, straight_on=True)
         # of an end that no slide showed it is known as far as where the crest was gone
         along_sd = end.sd if np.isfinite(end.sd) else max(end.reach, half)
         place = EndPlace(
@@ -107,34 +112,37 @@ class EndFinder:
             np.array([0.0, 0.0, 0.0, crest.height]),
             np.array([along_sd, half, UNKNOWN_TURN, crest.height_sd]),
         )
-        here, made, useless = 0.0, 0, set[float]()
-        while made < MOST_PASSES and place.fits and (place.sd[:2] > enough).any():
+        made, useless = 0, set[float]()
+        while made < MOST_PASSES and place.fits and place.within(half) and (place.sd[:2] > enough).any():
             could = [each for each in place.sweeps(SAMPLES_APART * half) if about.holds(each.offset)]
             could = [each for each in could if each.offset not in useless]
             if not could:
                 break
-            seconds = [(abs(each.offset - here) + PASSES * 2.0 * each.half) / self.strokes.speed for each in could]
-            gains = [place.gain(each, PASSES, enough) for each in could]
-            sweep = could[int(np.argmax(np.divide(gains, seconds)))]
+            seconds = np.array([2.0 * each.half for each in could]) / self.strokes.speed
+            chosen, foretold = place.next(could, seconds, enough)
+            sweep = could[chosen]
+            # what is foretold changes with what is felt: no more than was made before is made before the next look
+            passes = PASSES * max(1, round(min(0.5 * foretold, made) / PASSES))
             middle, heading = about.at(sweep.offset)
             left = np.cross(self.strokes.onto(middle)[1], heading)
-            traces = yield from to_and_fro(self.strokes.line(middle, left, sweep.half, sweep.half), PASSES)
-            here, made = sweep.offset, made + PASSES
-            if sum(map(len, traces)) < FEWEST_FITTED:
+            traces = yield from to_and_fro(self.strokes.line(middle, left, sweep.half, sweep.half), passes)
+            made += passes
+            if sum(map(len, traces)) < FEWEST_FITTED * passes // PASSES:
                 useless.add(sweep.offset)
                 continue
             for trace in traces:
                 feet = self.base.foot(trace.centers, self.strokes.tip_radius)
                 place.learn(sweep, (feet.points - middle) @ left, feet.height)
             place.solve()
-        along, across, _, height = place.place
+        along, across, _, height = place.place.tolist()
         known = bool((place.sd[:2] <= enough).all())
         shown = place.felt and (place.fits or known)
-        if not shown or max(abs(along), abs(across)) > half or height < 0.4 * crest.height:
-            return end
+        if not shown or not place.within(half) or height < 0.4 * crest.height:
+            return end, crest
         where, heading = about.at(along)
         point = self.strokes.onto(where + across * np.cross(self.strokes.onto(where)[1], heading))[0]
-        return replace(end, point=point, sd=float(place.sd[0]), across_sd=float(place.sd[1]), heading=heading)
+        sharp = replace(end, point=point, sd=float(place.sd[0]), across_sd=float(place.sd[1]), heading=heading)
+        return sharp, replace(crest, height=height, height_sd=float(place.sd[3]))
 
     def _section(self, end: AxisEnd, crest: Crest, half: float, about: _Course) -> EndSection:
         """What the trace looks like about an end of a line with such a course."""
@@ -143,12 +151,23 @@ class EndFinder:
         beside = _Course.about(self.strokes, replace(end, heading=left, turn=0.0), half, half)
         # centres are |I + r II| apart: where the base is twisted, what is nearest to a place beside the line lies ahead
         twist = float((about.normals[-1] - about.normals[0]) @ left / (about.along[-1] - about.along[0]))
-        wide = about.flattening(tip), beside.flattening(tip)
-        return EndSection(crest.sign, half, tip, wide, twist * tip / wide[0] ** 2)
+        wide = about.flattening(self._round(crest)), beside.flattening(self._round(crest))
+        return EndSection(crest.sign, half, tip, wide, twist * self._round(crest) / wide[0] ** 2)
+
+    def _round(self, crest: Crest) -> float:
+        """Radius about which the ball goes round a body of curvature k beside an end, m.
+
+        Over a cap whose middle stands c and whose top H over the base, the ball's centre falls as over a flat base
+        whose lengths are stretched by the root of (1 + k c) (1 + k (r + H)): with c = H / 2, to first order in H / r,
+        of 1 + k (r + 3/2 H). In a groove it rests on the base beside it.
+        """
+        return self.strokes.tip_radius + (1.5 * crest.height if crest.sign > 0 else 0.0)
 
     def _half(self, crest: Crest) -> float:
         """Half-width of the disturbance about an end, m: a groove is crossed no more where its end lifts the ball."""
-        return max(crest.half_width, float(np.sqrt(2.0 * self.strokes.tip_radius * crest.height)))
+        widest = float(np.sqrt(2.0 * self.strokes.tip_radius * crest.height))
+        # that of a ridge is narrower where the base is bent, and by that it is told how wide the ridge itself is
+        return crest.half_width if crest.sign > 0 else max(crest.half_width, widest)
 
     def _fitted(self, felt: Slides, about: _Course, crest: Crest, last: float) -> ShapeFit:
         """The end's place on its course, from all slides laid over each other."""
@@ -157,7 +176,7 @@ class EndFinder:
         # the correlated part of the noise averages out over the slides, not along them
         noise = self.noise.of_passes(felt.count)
         shape = end_shape(crest.sign, self.strokes.tip_radius)
-        wide = about.flattening(self.strokes.tip_radius)
+        wide = about.flattening(self._round(crest))
         fit = fit_shape(
             wide * place[order],
             felt.heights[order],
@@ -180,10 +199,12 @@ class _Course:
     along: FloatArray
 
     @classmethod
-    def about(cls, strokes: Strokes, end: AxisEnd, before: float, beyond: float) -> _Course:
-        """From so far before the end to so far beyond it, m."""
+    def about(
+        cls, strokes: Strokes, end: AxisEnd, before: float, beyond: float, *, straight_on: bool = False
+    ) -> _Course:
+        """From so far before the end to so far beyond it, m; on along the line's bend, or straight."""
         back = strokes.walk(end.point, -end.heading, before, -end.turn)
-        ahead = strokes.walk(end.point, end.heading, beyond, end.turn)
+        ahead = strokes.walk(end.point, end.heading, beyond, 0.0 if straight_on else end.turn)
         points = np.concatenate([back.points[:0:-1], ahead.points])
         normals = np.concatenate([back.normals[:0:-1], ahead.normals])
         return cls(points, normals, np.concatenate([-back.along[:0:-1], ahead.along]))
@@ -198,9 +219,9 @@ class _Course:
         k = int(np.clip(np.searchsorted(self.along, place), 1, len(self.points) - 1))
         return where, tangential(self.points[k] - self.points[k - 1], self.normals[k])
 
-    def flattening(self, tip_radius: float) -> float:
-        """By how much shapes along it are narrower than on a flat base."""
-        return flattening(self.along, self.normals, self.points[-1] - self.points[0], tip_radius)
+    def flattening(self, radius: float) -> float:
+        """By how much shapes along it are narrower than on a flat base, for a ball that goes round it so far off, m."""
+        return flattening(self.along, self.normals, self.points[-1] - self.points[0], radius)
 
 
 def places_along(points: FloatArray, line: FloatArray, along: FloatArray) -> FloatArray:

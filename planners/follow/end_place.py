@@ -10,12 +10,20 @@ from mapping import FloatArray
 from mapping.instrument import Noise
 from planners.follow.template_fit import covariance_of_means, end_heights, means_in_bins
 
-# Where sweeps may cross the line, in half-widths of its disturbance beyond the end
-OFFSETS = np.linspace(-1.0, 0.9, 20)
+# Where sweeps may cross the line, in half-widths of its disturbance beyond the end: those closer to each other tell the
+# same; and how far beyond the end, as it is known by now, the ball still feels enough of it
+OFFSETS, FARTHEST_SWEEP = np.array([-1.0, -0.75, -0.5, -0.25, *np.arange(0.0, 1.41, 0.1)]), 0.95
 # Bare base that a sweep takes in beside the disturbance, in half-widths
 BARE_MARGIN = 0.3
 # Bins of a sweep that was not made yet; and the step of a derivative, in half-widths, heights and rad
 FORETOLD_BINS, DERIVATIVE_STEP = 40, 1e-3
+# A base under a sweep may lie and slope by so many times what is felt of the line, or a sample's noise: the model gives
+# every sweep its own, too (mapping.inference.families.problem)
+VAGUE = 3.0
+# Shares of the time that two sweeps may have, to be made in turn until enough is known; and how long that may take, in
+# times of the shortest one
+TIME_SHARES = np.array([0.25, 0.5, 0.75])
+FORETOLD_TIMES = 2.0 * 1.4 ** np.arange(16)
 # Standard deviations of chi-squared beyond which something else is felt than a line that ends
 MISFIT_SDS = 5.0
 # By how much a line may turn where it ends, of which nothing is felt before: standard deviation, rad
@@ -52,7 +60,8 @@ class EndSection:
         high = max(float(place[3]), 0.0)
         thin = np.sqrt(2.0 * self.tip_radius * high) / (wide * self.half_width)
         du, dv = u - place[0], v - place[1]
-        along, across = du + (place[2] + self.shear) * dv, dv - place[2] * du
+        cosine, sine = np.cos(place[2]), np.sin(place[2])
+        along, across = cosine * du + (sine + self.shear) * dv, cosine * dv - sine * du
         return end_heights(long * along, thin * wide * across, high, self.sign, self.tip_radius)
 
     def derivatives(self, u: FloatArray, v: FloatArray, place: FloatArray) -> FloatArray:
@@ -107,31 +116,59 @@ class EndPlace:
         """True if any pass told of it."""
         return bool(self._felt)
 
+    def within(self, reach: float) -> bool:
+        """True if the end lies no farther from where it was first found, along and across, m."""
+        return bool(np.abs(self.place[:2]).max() <= reach)
+
     def sweeps(self, spacing: float) -> list[Across]:
         """All sweeps that could be made, with samples so far apart, m; what each tells, by what is known by now."""
         half_width, made = self.section.half_width, []
-        for offset in OFFSETS * half_width:
+        near = OFFSETS * half_width <= self.place[0] + FARTHEST_SWEEP * self.section.beyond
+        for offset in OFFSETS[near] * half_width:
             gone = min(max(offset - self.place[0], 0.0) / self.section.beyond, 1.0) if self.section.sign > 0 else 0.0
             half = (float(np.sqrt(1.0 - gone**2)) + BARE_MARGIN) * half_width
             edges = np.linspace(-half, half, FORETOLD_BINS + 1)
             v = 0.5 * (edges[1:] + edges[:-1])
             samples = np.full(FORETOLD_BINS, 2.0 * half / FORETOLD_BINS / spacing)
-            root = np.linalg.cholesky(covariance_of_means(v, samples, self.noise))
+            root = self._root(v, samples, self.noise)
             slopes = np.linalg.solve(root, self.section.derivatives(np.full_like(v, offset), v, self.place))
             made.append(Across(float(offset), half, slopes.T @ slopes))
         return made
 
-    def gain(self, sweep: Across, passes: int, enough: FloatArray) -> float:
-        """By how much so many more passes reduce the variances of the place, m^2, down to what is enough (2,) m."""
-        now, then = (
-            np.maximum(np.diag(np.linalg.inv(told))[:2], enough**2).sum()
-            for told in (self._told, self._told + passes * sweep.told)
-        )
-        return float(now - then)
+    def next(self, sweeps: list[Across], seconds: FloatArray, enough: FloatArray) -> tuple[int, float]:
+        """The sweep (its index) to make now, and how often it is still to be made, before enough (2,) m is known.
+
+        Of any one or two of them, made in turn, those that take the shortest time till then; if none comes so far in
+        the longest time looked at, those that come nearest. That which has the larger share of the time is first.
+
+        Args:
+            seconds: (S,) that one pass of each takes.
+        """
+        count = len(sweeps)
+        one, other = np.triu_indices(count, 1)
+        first = np.concatenate([np.arange(count), np.tile(one, len(TIME_SHARES))])
+        second = np.concatenate([np.arange(count), np.tile(other, len(TIME_SHARES))])
+        share = np.concatenate([np.ones(count), np.repeat(TIME_SHARES, len(one))])
+        rates = np.array([each.told for each in sweeps]) / seconds[:, None, None]
+        rate = share[:, None, None] * rates[first] + (1.0 - share)[:, None, None] * rates[second]
+        times = FORETOLD_TIMES * seconds.min()
+        known = np.linalg.inv(self._told + times[:, None, None, None] * rate)
+        short = (known[..., [0, 1], [0, 1]] / enough**2).max(axis=2)
+        reached = short.min(axis=1) <= 1.0
+        row = int(reached.argmax()) if reached.any() else len(times) - 1
+        best = int(short[row].argmin())
+        chosen = int(first[best] if share[best] >= 0.5 else second[best])
+        return chosen, float(max(share[best], 1.0 - share[best]) * times[row] / seconds[chosen])
 
     def learn(self, sweep: Across, across: FloatArray, heights: FloatArray) -> None:
         """One more pass: its places across the line (N,) and heights over the base (N,), m."""
         self._felt.setdefault(sweep.offset, []).append((across, heights))
+
+    def _root(self, places: FloatArray, samples: FloatArray, noise: Noise) -> FloatArray:
+        """(B, B) root of the covariance of means (B,) over a base that lies and slopes under each sweep as it may."""
+        vague = VAGUE * max(self._before[0][3], noise.sd)
+        base = vague * np.column_stack([np.ones(len(places)), (places - places.mean()) / (0.5 * np.ptp(places))])
+        return np.asarray(np.linalg.cholesky(covariance_of_means(places, samples, noise) + base @ base.T))
 
     def solve(self) -> None:
         """The best place by all passes so far, and how well it is known."""
@@ -144,7 +181,7 @@ class EndPlace:
             order = np.argsort(v, kind="stable")
             at, mean, samples = means_in_bins(v[order], heights[order])
             # the correlated part of the noise averages out over the passes, not along them
-            root = np.linalg.cholesky(covariance_of_means(at, samples, self.noise.of_passes(len(felt))))
+            root = self._root(at, samples, self.noise.of_passes(len(felt)))
             sweeps.append((np.full_like(at, offset), at, self.section.sign * mean, root))
         first, known = self._before
 

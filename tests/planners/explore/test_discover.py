@@ -14,6 +14,7 @@ from mapping.surface import Surface
 from planners.drive import drive
 from planners.errors import PlannerError
 from planners.explore.discover import Discover
+from planners.explore.warm_up import get_ready
 
 R = 5e-3
 MESHES = Path(__file__).resolve().parents[3] / "assets" / "meshes"
@@ -103,3 +104,10 @@ def test_a_block_on_a_table_is_a_polyhedron_without_its_underside() -> None:
     low, high = base.surface.bounds
     assert np.allclose([*low[:2], *high], [-0.03, -0.025, 0.03, 0.025, 0.02], atol=2e-5)
     assert (base.surface.face_normals[:, 2] > -0.5).all(), "the underside was not asked for"
+
+
+def test_what_exploring_loads_is_loaded_before_an_unknown_body_is_touched() -> None:
+    get_ready.cache_clear()
+    low, high = np.array([-0.02, -0.02, -0.01]), np.array([0.02, 0.02, 0.01])
+    next(Discover(low=low, high=high, tip_radius=R, smallest=3e-4).plan())
+    assert get_ready.cache_info().currsize == 1
