@@ -292,8 +292,12 @@ def apart(now: Configuration) -> Iterator[Parts]:
                 rest = [*now.parts[:k], *now.parts[k + 1 :]]
                 yield [*rest, *(part_of(_plainly(each), now.place) for each in two)]
         elif _is_crest(part) and (may_be_points(part, now.place) or not now.is_explained):
-            own = np.maximum(now.felt, 0.0)
-            points = [_felt_about(now, end, own, part.feature) for end in axis_of(part)[[0, -1]]]
+            own, ends = np.maximum(now.felt, 0.0), axis_of(part)[[0, -1]]
+            away = np.linalg.norm(now.place.window.feet - ends[:, None], axis=2)
+            points = [
+                _felt_about(now, end, np.where(near, own, 0.0), part.feature)  # else both are the higher one
+                for end, near in zip(ends, (away[0] < away[1], away[1] <= away[0]), strict=True)
+            ]
             yield [*now.parts[:k], *points, *now.parts[k + 1 :]]
 
 

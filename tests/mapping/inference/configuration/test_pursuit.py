@@ -11,7 +11,7 @@ from mapping import Feature, FloatArray, Interval, Support
 from mapping.inference.configuration import Places
 from mapping.inference.configuration.configuration import Configuration, fitted, part_of
 from mapping.inference.configuration.neighbourhood import neighbourhood
-from mapping.inference.configuration.proposals import axis_of, retold
+from mapping.inference.configuration.proposals import apart, axis_of, retold
 from mapping.inference.configuration.pursuit import pursued
 from mapping.inference.families import Surroundings
 from mapping.inference.kinds import feature_trace
@@ -71,3 +71,11 @@ def test_what_leaves_nothing_is_not_told_anew() -> None:
 def test_a_line_and_a_bump_that_were_told_as_two_lines_are_counted() -> None:
     case = run_counts(FIRST_BUILT_WITH + 389)
     assert case.true == 3 and not case.left_open and case.stated[3] > 0.9
+
+
+def test_two_bumps_that_were_told_as_a_short_ridge_begin_where_each_is_felt() -> None:
+    true = [_crest([(0.0, -1.3)], 0.4), _crest([(0.6, 1.5)], 0.3)]
+    told = _told_as(_crest([(0.0, -1.0), (0.4, 1.2)], 0.35), true)
+    (points,) = apart(told)
+    begun = 1e3 * np.array([axis_of(part)[0, :2] for part in points])
+    np.testing.assert_allclose(begun[np.argsort(begun[:, 1])], [[0.0, -1.3], [0.6, 1.5]], atol=0.7)
