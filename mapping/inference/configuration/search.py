@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
@@ -156,6 +157,7 @@ class _Search:
         visited: the best of each set of kinds, of so many parts.
         accepted: names of the proposals that led to the best.
         bounded: True if it ended with proposals left.
+        asked: how often each proposal had its turn, by name.
     """
 
     points: FloatArray
@@ -164,6 +166,7 @@ class _Search:
     visited: dict[tuple[tuple[str, ...], int], Configuration] = field(default_factory=dict)
     accepted: list[str] = field(default_factory=list)
     bounded: bool = False
+    asked: Counter[str] = field(default_factory=Counter)
 
     def note(self, other: Configuration) -> None:
         """One more was visited."""
@@ -173,35 +176,56 @@ class _Search:
 
     def climbed(self, best: Configuration, by: Callable[[Configuration], float]) -> Configuration:
         """A configuration improved by proposals until none is better by what is given."""
-        spent = self.spent
         first = [each for each in self.proposals if each in FIRST]
         others = [each for each in self.proposals if each not in FIRST]
         waiting, idle, turn = list(first), 0, itertools.cycle(others)
         while waiting or idle < len(others):
             if not waiting:
                 idle += 1
-            proposal, found = waiting.pop(0) if waiting else next(turn), best
-            for proposed in _yielded(proposal, best, self.points):
-                # what does not pay for itself goes, and what is left over is told anew, however many there are
-                if spent.too_much if proposal in (REMOVE, RETELL) else spent.enough:
-                    self.bounded = True
-                    break
-                other = fitted(proposed, best.place, best)
-                spent.on(proposed, best.place, GIVEN_UP_SHARE if other is None else 1.0)
-                # crests beside crests hide what has another form: what is told anew leaves nothing, or is none
-                if other is None or (proposal is RETELL and not other.fits):
-                    continue
-                self.note(other)
-                if by(other) > by(found) + WORTH:
-                    found = other
-                    if proposal is RETELL and found.is_explained:  # the other answers seemed less likely
-                        break
+            proposal = waiting.pop(0) if waiting else next(turn)
+            self.asked[proposal.name] += 1
+            found, partly = self._better(best, proposal, best, by)
+            if found is best and partly is not None and not best.fits:  # what that leaves is told anew once more
+                found, _ = self._better(best, proposal, partly, by)
             if found is not best:
                 best, waiting, idle = found, list(first), 0
                 self.accepted.append(proposal.name)
                 if proposal is RETELL:  # from there the search begins anew
-                    spent.fits, self.bounded = 0.0, False
+                    self.spent.fits, self.bounded = 0.0, False
         return best
+
+    def _better(
+        self, best: Configuration, proposal: Proposal, begun: Configuration, by: Callable[[Configuration], float]
+    ) -> tuple[Configuration, Configuration | None]:
+        """The best that a proposal makes of a configuration, or what was the best before; and of what is told anew and
+        leaves more than noise the best."""
+        found, spent = best, self.spent
+        partly: Configuration | None = None
+        for proposed in _yielded(proposal, begun, self.points):
+            if self._ends(proposal):
+                self.bounded = True
+                break
+            other = fitted(proposed, best.place, best)
+            spent.on(proposed, best.place, GIVEN_UP_SHARE if other is None else 1.0)
+            if other is None:
+                continue
+            # crests beside crests hide what has another form: what is told anew leaves nothing, or is none
+            if proposal is RETELL and not other.fits:
+                partly = other if partly is None or by(other) > by(partly) else partly
+                continue
+            self.note(other)
+            if by(other) > by(found) + WORTH:
+                found = other
+                if proposal is RETELL and found.is_explained:  # the other answers seemed less likely
+                    break
+        return found, partly
+
+    def _ends(self, proposal: Proposal) -> bool:
+        """True if no more of a proposal is tried. What does not pay for itself goes, and what is left over is told
+        anew, however many there are; no proposal stays unasked because others were asked often."""
+        if proposal in (REMOVE, RETELL):
+            return self.spent.too_much
+        return self.spent.enough if self.asked[proposal.name] > 1 else self.spent.all_work
 
 
 @dataclass(eq=False)

@@ -61,6 +61,14 @@ def test_what_is_better_by_less_than_counts_is_weighed_but_not_told(monkeypatch:
     assert account.best is account.start and len(account.visited) == 2
 
 
+def test_no_proposal_stays_unasked_because_another_was_asked_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search, "fitted", lambda parts, place, rival=None, anew=False: found(parts, 2.0))
+    monkeypatch.setattr(search, "FIRST", ())
+    often = Proposal("often", lambda now, points: iter([[]] * (search.MOST_FITTED + 1)))
+    account = search.searched(found([], 2.0), [], np.zeros((0, 3)), [often, Proposal("more", more)])
+    assert len(account.best.parts) == 1 and account.bounded  # the second detail would be asked for once more
+
+
 def test_what_is_probable_beside_others_is_stated_and_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
     account, _ = searched(monkeypatch, -2.0, 4.0)
     assert account.best is account.start and account.accepted == ()
