@@ -260,10 +260,11 @@ def _evenly(axis: FloatArray) -> FloatArray:
 def between(now: Configuration) -> Iterator[Parts]:
     """A groove between two ridges that face each other, and a ridge along each rim of a groove."""
     for one, other in itertools.combinations(range(len(now.parts)), 2):
-        first, second = now.parts[one], now.parts[other]
-        ridges = {type(first.shape), type(second.shape)} == {RidgeShape}
-        if ridges and _faces(first, second, now.place, NEIGHBOURHOOD_REACH):
-            yield [*now.parts, _hollow(axis_of(first), axis_of(second), first.feature, now.place)]
+        first, second = (_ridge_of(now.parts[k], now.place) for k in (one, other))
+        if first and second and _faces(first, second, now.place, NEIGHBOURHOOD_REACH):
+            # what a hollow between them leaves is no part of their sections
+            rest = [part for k, part in enumerate(now.parts) if k not in (one, other)]
+            yield [*rest, first, second, _hollow(axis_of(first), axis_of(second), first.feature, now.place)]
     for k, part in enumerate(now.parts):
         if isinstance(part.shape, TwinShape):
             single = apart_of(part)

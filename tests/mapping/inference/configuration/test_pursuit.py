@@ -9,9 +9,9 @@ from explore3d.bench.posterior.counts import run_counts
 from explore3d.bench.scenes import FIRST_BUILT_WITH
 from mapping import Feature, FloatArray, Interval, Support
 from mapping.inference.configuration import Places
-from mapping.inference.configuration.configuration import Configuration, fitted, part_of
+from mapping.inference.configuration.configuration import Configuration, as_bell, fitted, laid, part_of
 from mapping.inference.configuration.neighbourhood import neighbourhood
-from mapping.inference.configuration.proposals import apart, axis_of, retold
+from mapping.inference.configuration.proposals import apart, axis_of, between, retold
 from mapping.inference.configuration.pursuit import pursued
 from mapping.inference.families import Surroundings
 from mapping.inference.kinds import feature_trace
@@ -79,3 +79,12 @@ def test_two_bumps_that_were_told_as_a_short_ridge_begin_where_each_is_felt() ->
     (points,) = apart(told)
     begun = 1e3 * np.array([axis_of(part)[0, :2] for part in points])
     np.testing.assert_allclose(begun[np.argsort(begun[:, 1])], [[0.0, -1.3], [0.6, 1.5]], atol=0.7)
+
+
+def test_a_groove_is_asked_between_ridges_of_any_section() -> None:
+    rims = [_crest([(-8.0, y), (8.0, y)], 0.15) for y in (-2.0, 2.0)]
+    told = _told_as(rims[0], rims)
+    first, second = (part_of(rim, told.place) for rim in rims)
+    asked = laid([as_bell(first, 0.5 * told.place.half_width), second], told.place)
+    (hollow,) = [parts for parts in between(asked) if len(parts) == 3]
+    assert [part.feature.kind for part in hollow] == ["ridge", "ridge", "groove"]
