@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mapping import Dropped, Feature, FloatArray, length_text
+from mapping import BoolArray, Dropped, Feature, FloatArray, length_text
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference.kinds import feature_trace, kind_of, sizes_of
@@ -44,7 +44,8 @@ def dropped_crossings(
 ) -> tuple[Dropped, ...]:
     """Crossings that no feature accounts for: none lies within their disturbance, or within its own, or leaves most of
     what was felt there, as the flank of a bump that runs out does to the rows that pass beside it; nor did the ball
-    stand on one, whose foot was on a wall beside it: in the corner before a ridge's end it touches all three.
+    stand on one, whose foot was on a wall beside it: in the corner before a ridge's end it touches all three. Of those
+    that were felt together one is told, the plainest.
 
     Args:
         crossings: all that was detected.
@@ -82,17 +83,42 @@ def dropped_crossings(
             # a ball rests on what it is nearest to: the base is so far away as it stands over it
             accounted |= np.abs(_gap_to_crest(centers, feature, tip_radius)) < (1.0 - MOST) * height
         nearest, away = np.where(apart < away, number, nearest), np.minimum(apart, away)
+    groups = _felt_together(crossings, ~accounted)
+    plainest = [max(group, key=lambda k: crossings[k].snr) for group in groups]
     return tuple(
         Dropped(
-            crossing.kind,
-            crossing.point,
-            crossing.height,
-            crossing.snr,
-            1,
+            crossings[i].kind,
+            crossings[i].point,
+            crossings[i].height,
+            float(np.sqrt(sum(crossings[k].snr ** 2 for k in group))),
+            len(group),
             None,
             "what was felt around it makes neither line nor spot of it"
-            + (f"; the nearest, a {features[k].kind}, is {length_text(gap, 2)} away" if k >= 0 else ""),
+            + (
+                f"; the nearest, a {features[nearest[i]].kind}, is {length_text(away[i], 2)} away"
+                if nearest[i] >= 0
+                else ""
+            ),
         )
-        for crossing, known, k, gap in zip(crossings, accounted, nearest, away, strict=True)
-        if not known
+        for i, group in zip(plainest, groups, strict=True)
     )
+
+
+def _felt_together(crossings: Sequence[Crossing], lone: BoolArray) -> list[list[int]]:
+    """Numbers of lone crossings (n,) of one kind whose disturbances touch, group by group: noise makes one crossing
+    clear of it where its law is heavy, but not several beside each other in different sweeps."""
+    left, groups = [int(k) for k in np.flatnonzero(lone)], []
+    while left:
+        group = [left.pop(0)]
+        for k in group:  # grows while it is gone through
+            one = crossings[k]
+            near = [m for m in left if crossings[m].kind == one.kind and crossings[m].sweep != one.sweep]
+            near = [
+                m
+                for m in near
+                if np.linalg.norm(crossings[m].point - one.point) < crossings[m].half_width + one.half_width
+            ]
+            group += near
+            left = [m for m in left if m not in near]
+        groups.append(sorted(group))
+    return groups

@@ -2,7 +2,8 @@
 
 Random plates bear none to five details that stand out, bumps and wires, anywhere, so that some overlap. They are swept,
 detected and assembled as a log is; the probability of each number of details is what the accounts of the found ones say
-together. A detail that leaves too little in the trace to be detected, the others being there, does not count.
+together. A detail that leaves too little in the trace to be detected, the others being there, is not laid down: nobody
+could say whether to count it.
 """
 
 from __future__ import annotations
@@ -35,14 +36,15 @@ SHORTEST_WIRE, LONGEST_WIRE = 6e-3, 20e-3
 # Standard deviation of the place of one that lies beside another, m: the half-width of the disturbance of the highest
 BESIDE = 3.5e-3
 # What leaves less than so many standard deviations over what the others leave cannot be counted: the threshold of
-# crossings at 0.01 false alarms a metre is 5 to 6
+# crossings at 0.01 false alarms a metre is 5 to 6. Of 7 numbers that were too high where plates bore such details
+# and did not count them 4 were the true numbers of all (building seeds 1200 to 1299)
 COUNTED_SNR = 8.0
 DECILES = np.linspace(0.0, 1.0, 11)
 
 
 @dataclass(frozen=True)
 class CountCase:
-    """One plate: how many details it bears that leave a trace, and the probability that was stated of each number.
+    """One plate: how many details it bears, and the probability that was stated of each number.
 
     `without` names the proposal that was not made. `left_open` is True if it is said of some details that they do not
     explain what was felt: no probability is stated then, and `stated` holds how many were told.
@@ -71,9 +73,8 @@ def run_counts(seed: int, without: str = "") -> CountCase:
     up = np.tile([0.0, 0.0, 1.0], (len(feet), 1))
     tip = record([feet], np.zeros(len(feet))).tip_radius
     each = np.array([feature_trace(detail, feet, up, tip) for detail in details]).reshape(len(details), len(feet))
-    heights = each.max(axis=0, initial=0.0)
-    rests = [np.delete(each, k, axis=0).max(axis=0, initial=0.0) for k in range(len(details))]
-    true = sum(float(np.linalg.norm(heights - rest)) > COUNTED_SNR * WHITE for rest in rests)
+    each = counted(each)
+    true, heights = len(each), each.max(axis=0, initial=0.0)
     trace, base = record(paths, heights + WHITE * rng.standard_normal(len(feet))), plate()
     start = time.process_time()
     laid = LaidTrace.of(trace, base)
@@ -81,6 +82,19 @@ def run_counts(seed: int, without: str = "") -> CountCase:
     features = assemble(detect(laid, base), laid, base, proposals=proposals)
     seconds, left_open = time.process_time() - start, any(UNEXPLAINED in feature.notes for feature in features)
     return CountCase(seed, true, stated_counts(features), seconds, without, left_open)
+
+
+def counted(each: FloatArray) -> FloatArray:
+    """Of what details leave (K, n), m, that of those which stay: the one that leaves least beside the others goes until
+    each leaves enough to be counted."""
+    while len(each):
+        rests = [np.delete(each, k, axis=0).max(axis=0, initial=0.0) for k in range(len(each))]
+        left = np.linalg.norm(each.max(axis=0) - rests, axis=1)
+        weakest = int(np.argmin(left))
+        if left[weakest] > COUNTED_SNR * WHITE:
+            break
+        each = np.delete(each, weakest, axis=0)
+    return each
 
 
 def drawn(rng: np.random.Generator, others: Sequence[Feature] = ()) -> Feature:

@@ -199,6 +199,11 @@ class Configuration:
         """Log odds of its details before the data."""
         return sum(_log_prior(part, self.place) for part in self.parts)
 
+    @property
+    def log_probability(self) -> float:
+        """Its log odds where details are as frequent as the log shows elsewhere."""
+        return self.log_odds + self.place.log_company(len(self.parts))
+
     @cached_property
     def as_narrow_as_wires(self) -> list[bool]:
         """Of each part whether it is a ridge as narrow as a wire of its height that lies on the base, within doubt."""

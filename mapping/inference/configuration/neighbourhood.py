@@ -63,6 +63,11 @@ class Places:
     stepped: FloatArray = field(default_factory=lambda: np.zeros(0))
     jumped: FloatArray = field(default_factory=lambda: np.zeros(0))
 
+    @property
+    def path(self) -> float:
+        """Length that was inspected, m."""
+        return self.spacing * int((self.samples > 0).sum())
+
 
 @dataclass(frozen=True, eq=False)
 class Neighbourhood:
@@ -78,6 +83,8 @@ class Neighbourhood:
         false_alarms_per_metre: false features that are accepted, 1/m of path.
         held: details of other neighbourhoods that reach into this one, and stay as they are.
         theirs: the parameters of these in a row.
+        elsewhere: details that the log shows in other neighbourhoods.
+        path: that was inspected in all, m.
     """
 
     window: Window
@@ -89,6 +96,19 @@ class Neighbourhood:
     false_alarms_per_metre: float
     held: tuple[Shape, ...] = ()
     theirs: FloatArray = field(default_factory=lambda: np.zeros(0))
+    elsewhere: int = 0
+    path: float = np.inf
+
+    def log_company(self, details: int) -> float:
+        """Log of how much more probable so many details are here than at the accepted rate of false alarms a, by what
+        the log shows elsewhere.
+
+        How many details a body bears on a metre of path is not known by its order of magnitude, but that it is a at
+        least: of a rate λ with p(λ) ~ 1/λ the marginal of Poisson's law makes one more beside n others in a path of
+        length L n/L times as probable as it is long, where that exceeds a.
+        """
+        beside = np.arange(self.elsewhere, self.elsewhere + details) / self.path
+        return float(np.log(np.maximum(beside / self.false_alarms_per_metre, 1.0)).sum())
 
     def joined(self, shapes: Sequence[Shape]) -> JoinedShape:
         """Some shapes over `fine` and what reaches into the neighbourhood, as they are felt together."""
@@ -102,8 +122,10 @@ def neighbourhood(
     around: Surroundings,
     false_alarms_per_metre: float,
     beside: Sequence[Feature] = (),
+    elsewhere: int = 0,
 ) -> Neighbourhood | None:
-    """The neighbourhood of some features and crossings, with others beside; None where too few places tell of it."""
+    """The neighbourhood of some features and crossings, with others beside, and so many elsewhere; None where too few
+    places tell of it."""
     tip = around.trace.tip_radius
     sizes = [sizes_of(feature, tip) for feature in features]
     widths = [size.half_width for size in sizes] + [thin_half_width(crossing, tip) for crossing in crossings]
@@ -135,7 +157,10 @@ def neighbourhood(
         constant = np.log(likelihood.filter.scale).sum() + 0.5 * np.log1p(-likelihood.shrink).sum()
         levels.append((likelihood, float(constant)))
     told = np.array([crossing.point for crossing in crossings]).reshape(-1, 3)
-    return Neighbourhood(window, _finer(window), around, tuple(levels), half_width, told, false_alarms_per_metre)
+    return Neighbourhood(
+        window, _finer(window), around, tuple(levels), half_width, told, false_alarms_per_metre,
+        elsewhere=elsewhere, path=places.path,
+    )  # fmt: skip
 
 
 def _ended(features: Sequence[Feature], widths: Sequence[float], places: Places) -> BoolArray:

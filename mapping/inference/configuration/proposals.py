@@ -264,10 +264,11 @@ def _evenly(axis: FloatArray) -> FloatArray:
 def between(now: Configuration) -> Iterator[Parts]:
     """A groove between two ridges that face each other, and a ridge along each rim of a groove."""
     for one, other in itertools.combinations(range(len(now.parts)), 2):
-        first, second = now.parts[one], now.parts[other]
-        ridges = {type(first.shape), type(second.shape)} == {RidgeShape}
-        if ridges and _faces(first, second, now.place, NEIGHBOURHOOD_REACH):
-            yield [*now.parts, _hollow(axis_of(first), axis_of(second), first.feature, now.place)]
+        first, second = (_ridge_of(now.parts[k], now.place) for k in (one, other))
+        if first and second and _faces(first, second, now.place, NEIGHBOURHOOD_REACH):
+            # what a hollow between them leaves is no part of their sections
+            rest = [part for k, part in enumerate(now.parts) if k not in (one, other)]
+            yield [*rest, first, second, _hollow(axis_of(first), axis_of(second), first.feature, now.place)]
     for k, part in enumerate(now.parts):
         if isinstance(part.shape, TwinShape):
             single = apart_of(part)
@@ -296,8 +297,12 @@ def apart(now: Configuration) -> Iterator[Parts]:
                 rest = [*now.parts[:k], *now.parts[k + 1 :]]
                 yield [*rest, *(part_of(_plainly(each), now.place) for each in two)]
         elif _is_crest(part) and (may_be_points(part, now.place) or not now.is_explained):
-            own = np.maximum(now.felt, 0.0)
-            points = [_felt_about(now, end, own, part.feature) for end in axis_of(part)[[0, -1]]]
+            own, ends = np.maximum(now.felt, 0.0), axis_of(part)[[0, -1]]
+            away = np.linalg.norm(now.place.window.feet - ends[:, None], axis=2)
+            points = [
+                _felt_about(now, end, np.where(near, own, 0.0), part.feature)  # else both are the higher one
+                for end, near in zip(ends, (away[0] < away[1], away[1] <= away[0]), strict=True)
+            ]
             yield [*now.parts[:k], *points, *now.parts[k + 1 :]]
 
 
@@ -542,6 +547,51 @@ def _more(now: Configuration) -> Iterator[Parts]:
         yield [*now.parts, part_of(replace(model, kind=spot.name), now.place)]
 
 
+def stepped(now: Configuration) -> Iterator[Parts]:
+    """A step where runs change their level most, beside what is there or instead of a part of it, where something is
+    left over: no crest leads to one, and what is felt at its foot is taken for a hollow or a bump.
+
+    The level of each run is free: through two or three of them a step would be drawn beside any line that ends.
+    """
+    if now.is_explained:
+        return
+    window, kind = now.place.window, kind_made_of("step", line=True)
+    for told in dict.fromkeys((now, laid([], now.place))):
+        places, rises = _changes_of_level(told.residual, now)
+        for axis in straight_lines(places, ON_LINE * now.place.half_width)[:1]:
+            near = distances(places, axis) < ON_LINE * now.place.half_width
+            if near.sum() < FEWEST_POINTS:
+                continue
+            rise = float(np.median(rises[near]))
+            up = window.normals[int(np.linalg.norm(window.feet - axis[0], axis=1).argmin())]
+            edge = _line(_sized(_model(now.place, axis[0], up, rise), kind.name, rise, 0.0), axis, now.place)
+            yield [*now.parts, edge]
+            for k in range(len(now.parts)):
+                yield [*now.parts[:k], *now.parts[k + 1 :], edge]
+
+
+def _changes_of_level(over: FloatArray, now: Configuration) -> tuple[FloatArray, FloatArray]:
+    """(M, 3) places at which runs change their level most, of those that do by PEAK_SDS, and (M,) by how much, m.
+
+    Args:
+        over: (n,) heights, m.
+        now: of which neighbourhood.
+    """
+    window, weight = now.place.window, now.place.levels[0][0].filter.scale ** 2
+    places, rises = [np.zeros((0, 3))], [np.zeros(0)]
+    for start, stop in itertools.pairwise(window.starts):
+        own, heavy = over[start:stop], weight[start:stop]
+        before, first = np.cumsum(heavy)[:-1], np.cumsum(heavy * own)[:-1]
+        behind, second = heavy.sum() - before, (heavy * own).sum() - first
+        rise = second / behind - first / before
+        strength = np.abs(rise) / np.sqrt(1.0 / before + 1.0 / behind)
+        k = int(np.argmax(strength))
+        if strength[k] > PEAK_SDS:
+            places.append(0.5 * (window.feet[start + k] + window.feet[start + k + 1])[None])
+            rises.append(np.abs(rise[k : k + 1]))
+    return np.concatenate(places), np.concatenate(rises)
+
+
 def retold(now: Configuration) -> Iterator[Parts]:
     """All details or all but one, or none, and beside them the thin crests that explain best what is felt, where the
     configuration leaves something over."""
@@ -632,6 +682,7 @@ PROPOSALS = (
     Proposal("kind", lambda now, points: other_kinds(now)),
     Proposal("extend", lambda now, points: extended(now)),
     Proposal("add", lambda now, points: more(now)),
+    Proposal("step", lambda now, points: stepped(now)),
 )
 
 

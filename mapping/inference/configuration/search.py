@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from operator import attrgetter
 
 import numpy as np
 
@@ -46,6 +48,8 @@ FIRST = (REMOVE, SMOOTHER)
 WORTH = 0.5
 # What is less likely than the best by this log odds is not gone on from, nor told
 NEGLIGIBLE_ODDS = 7.0
+# What decides which configuration is told, and how probable each is said to be
+TOLD_BY, STATED_BY = attrgetter("log_odds"), attrgetter("log_probability")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +59,7 @@ class Account:
     Args:
         start: what the rules say.
         best: the last configuration that was accepted: none that was visited is better by more than rounding.
-        visited: the best of each set of kinds, the most probable first.
+        visited: the best of each set of kinds, of so many parts, the most probable first.
         accepted: names of the proposals that led from the beginning to the best.
         bounded: True if the search ended at MOST_FITTED or MOST_WORK, with proposals left.
     """
@@ -69,9 +73,12 @@ class Account:
     @property
     def shares(self) -> list[tuple[tuple[str, ...], float]]:
         """Probability of each set of kinds among those that were visited, the largest first."""
-        odds = np.array([each.log_odds for each in self.visited])
+        odds = np.array([each.log_probability for each in self.visited])
         weights = np.exp(odds - odds.max())
-        return [(each.kinds, float(w)) for each, w in zip(self.visited, weights / weights.sum(), strict=True)]
+        shares = dict.fromkeys((each.kinds for each in self.visited), 0.0)
+        for each, weight in zip(self.visited, weights / weights.sum(), strict=True):
+            shares[each.kinds] += float(weight)
+        return sorted(shares.items(), key=lambda each: -each[1])
 
 
 def searched(
@@ -85,16 +92,17 @@ def searched(
         points: (M, 3) of crests in the neighbourhood, m.
         proposals: the generators that are asked in turn, those of FIRST again after each improvement.
     """
-    place, best, accepted = start.place, start, list[str]()
-    spent, bounded = _Spent(len(parts)), False
+    place, best = start.place, start
+    search = _Search(points, proposals, _Spent(len(parts)))
+    spent, accepted = search.spent, search.accepted
     spent.on(parts, place)
-    visited = {start.kinds: start}
+    search.note(start)
     if REMOVE in proposals:
         # what the others explain as well is no piece of anything; these trials cost less than any other
-        best, kept, bounded = _without_idle(start, spent)
+        best, kept, search.bounded = _without_idle(start, spent)
         if best is not start:
             parts = [parts[k] for k in kept]
-            visited[best.kinds] = best
+            search.note(best)
             accepted.append(REMOVE.name)
     whole, joining, joiners = laid(parts, place), True, [each for each in (ONE_COURSE, JOIN) if each in proposals]
     # pieces of one line hide each other once they are fitted: they are joined as the rules left them, those first that
@@ -107,7 +115,7 @@ def searched(
                 break
             for other_parts in _yielded(proposal, whole, points):
                 if spent.all_work:
-                    bounded = True
+                    search.bounded = True
                     break
                 # a closed course begins far from where it fits: of few courses none is given up
                 rival = best if proposal is JOIN else None
@@ -117,40 +125,107 @@ def searched(
                     best, joined, joining, joiner = other, laid(other_parts, place), True, proposal
         if joining:
             whole = joined
-            visited[best.kinds] = best
+            search.note(best)
             accepted.append(joiner.name)
-    first = [each for each in proposals if each in FIRST]
-    others = [each for each in proposals if each not in FIRST]
-    waiting, idle, turn = list(first), 0, itertools.cycle(others)
-    while waiting or idle < len(others):
-        if not waiting:
-            idle += 1
-        proposal, found = waiting.pop(0) if waiting else next(turn), best
-        for proposed in _yielded(proposal, best, points):
-            # what does not pay for itself goes, and what is left over is told anew, however many there are
-            if spent.too_much if proposal in (REMOVE, RETELL) else spent.enough:
-                bounded = True
+    best = search.climbed(best, TOLD_BY)
+    to_told = len(accepted)
+    # what is probable where the log bears so many details is no proof of one more: the search goes on from there for
+    # what may be stated, and returns if that leads to what is told
+    while True:
+        probable = max(search.visited.values(), key=STATED_BY)
+        if probable.log_probability > best.log_probability + WORTH:
+            spent.fits = 0.0
+            search.climbed(probable, STATED_BY)
+        told = max(search.visited.values(), key=TOLD_BY)
+        if told.log_odds <= best.log_odds + WORTH:
+            break
+        best, to_told = search.climbed(told, TOLD_BY), len(accepted)
+    order = sorted(search.visited.values(), key=lambda each: -each.log_probability)
+    least = min(order[0].log_probability - NEGLIGIBLE_ODDS, best.log_probability)
+    likely = [each for each in order if each.log_probability >= least]
+    return Account(start, best, tuple(likely), tuple(accepted[:to_told]), search.bounded)
+
+
+@dataclass(eq=False)
+class _Search:
+    """A search on its way.
+
+    Args:
+        points: (M, 3) of crests in the neighbourhood, m.
+        proposals: the generators that are asked in turn, those of FIRST again after each improvement.
+        spent: what it has taken by now.
+        visited: the best of each set of kinds, of so many parts.
+        accepted: names of the proposals that led to the best.
+        bounded: True if it ended with proposals left.
+        asked: how often each proposal had its turn, by name.
+    """
+
+    points: FloatArray
+    proposals: Sequence[Proposal]
+    spent: _Spent
+    visited: dict[tuple[tuple[str, ...], int], Configuration] = field(default_factory=dict)
+    accepted: list[str] = field(default_factory=list)
+    bounded: bool = False
+    asked: Counter[str] = field(default_factory=Counter)
+
+    def note(self, other: Configuration) -> None:
+        """One more was visited."""
+        known = self.visited.get((other.kinds, len(other.parts)))
+        if known is None or other.log_odds > known.log_odds:
+            self.visited[other.kinds, len(other.parts)] = other
+
+    def climbed(self, best: Configuration, by: Callable[[Configuration], float]) -> Configuration:
+        """A configuration improved by proposals until none is better by what is given."""
+        first = [each for each in self.proposals if each in FIRST]
+        others = [each for each in self.proposals if each not in FIRST]
+        waiting, idle, turn = list(first), 0, itertools.cycle(others)
+        while waiting or idle < len(others):
+            if not waiting:
+                idle += 1
+            proposal = waiting.pop(0) if waiting else next(turn)
+            self.asked[proposal.name] += 1
+            found, partly = self._better(best, proposal, best, by)
+            if found is best and partly is not None and not best.fits:  # what that leaves is told anew once more
+                found, _ = self._better(best, proposal, partly, by)
+            if found is not best:
+                best, waiting, idle = found, list(first), 0
+                self.accepted.append(proposal.name)
+                if proposal is RETELL:  # from there the search begins anew
+                    self.spent.fits, self.bounded = 0.0, False
+        return best
+
+    def _better(
+        self, best: Configuration, proposal: Proposal, begun: Configuration, by: Callable[[Configuration], float]
+    ) -> tuple[Configuration, Configuration | None]:
+        """The best that a proposal makes of a configuration, or what was the best before; and of what is told anew and
+        leaves more than noise the best."""
+        found, spent = best, self.spent
+        partly: Configuration | None = None
+        for proposed in _yielded(proposal, begun, self.points):
+            if self._ends(proposal):
+                self.bounded = True
                 break
             other = fitted(proposed, best.place, best)
             spent.on(proposed, best.place, GIVEN_UP_SHARE if other is None else 1.0)
-            # crests beside crests hide what has another form: what is told anew leaves nothing, or is none
-            if other is None or (proposal is RETELL and not other.fits):
+            if other is None:
                 continue
-            known = visited.get(other.kinds)
-            if known is None or other.log_odds > known.log_odds:
-                visited[other.kinds] = other
-            if other.log_odds > found.log_odds + WORTH:
+            # crests beside crests hide what has another form: what is told anew leaves nothing, or is none
+            if proposal is RETELL and not other.fits:
+                partly = other if partly is None or by(other) > by(partly) else partly
+                continue
+            self.note(other)
+            if by(other) > by(found) + WORTH:
                 found = other
                 if proposal is RETELL and found.is_explained:  # the other answers seemed less likely
                     break
-        if found is not best:
-            best, waiting, idle = found, list(first), 0
-            accepted.append(proposal.name)
-            if proposal is RETELL:  # from there the search begins anew
-                spent.fits, bounded = 0.0, False
-    order = sorted(visited.values(), key=lambda each: -each.log_odds)
-    likely = [each for each in order if each.log_odds > order[0].log_odds - NEGLIGIBLE_ODDS]
-    return Account(start, best, tuple(likely), tuple(accepted), bounded)
+        return found, partly
+
+    def _ends(self, proposal: Proposal) -> bool:
+        """True if no more of a proposal is tried. What does not pay for itself goes, and what is left over is told
+        anew, however many there are; no proposal stays unasked because others were asked often."""
+        if proposal in (REMOVE, RETELL):
+            return self.spent.too_much
+        return self.spent.enough if self.asked[proposal.name] > 1 else self.spent.all_work
 
 
 @dataclass(eq=False)

@@ -70,20 +70,9 @@ class Chart:
 
     def coordinates(self, points: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
         """Distance along the curve, signed lateral distance (n,) and nearest leg of points (n, 3) on the base, m."""
-        start, leg = self.points[:-1], np.diff(self.points, axis=0)
-        square = np.maximum(np.einsum("ij,ij->i", leg, leg), np.finfo(float).tiny)
-        share = (points @ leg.T - np.einsum("ij,ij->i", start, leg)) / square
-        share = np.clip(share, 0.0, 1.0)
-        # |p - (start + share leg)|^2 without an (n, K, 3) array
-        cross = points @ start.T
-        gap = (
-            np.einsum("ij,ij->i", points, points)[:, None]
-            - 2.0 * (cross + share * (points @ leg.T))
-            + np.einsum("ij,ij->i", start, start)
-            + 2.0 * share * np.einsum("ij,ij->i", start, leg)
-            + share**2 * square
-        )
-        nearest = np.argmin(gap, axis=1)
+        from mapping.inference.curves.leg_kernels import nearest_legs
+
+        nearest = nearest_legs(points, self.points)
         s, lateral = self._on_leg(points, nearest)
         return s, lateral, nearest
 

@@ -66,3 +66,12 @@ def test_a_ball_in_the_corner_before_a_ridges_end_stands_on_that_end_though_its_
 def test_a_feature_that_hardly_anything_speaks_for_is_kept_with_its_odds() -> None:
     (dropped,) = dropped_features([bump(0.0, 0.3), replace(bump(1.0, 0.0), evidence=Support(3.0, 1))])
     assert isinstance(dropped, Dropped) and dropped.log_odds == 0.3 and "log odds 0.3" in dropped.reason
+
+
+def test_lone_crossings_that_were_felt_together_are_told_as_one_at_the_plainest() -> None:
+    near, nearer = (replace(crossing(0.0), sweep=k, point=np.array([0.0, 0.8e-3 * k, 0.0])) for k in (2, 3))
+    beside = [replace(near, snr=12.0), nearer]
+    hollow, far = replace(crossing(0.0), sweep=4, kind="concave"), crossing(5e-3, 20.0)
+    together, other, alone = dropped_crossings([crossing(0.0, 8.0), *beside, hollow, far], [], 10e-3)
+    assert together.crossings == 3 and together.snr == np.sqrt(8.0**2 + 12.0**2 + 9.0**2)
+    assert together.point[1] == 1.6e-3 and (other.kind, other.crossings, alone.crossings) == ("concave", 1, 1)

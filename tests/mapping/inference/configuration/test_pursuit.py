@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from explore3d.bench.posterior.calibration import plate, record, straight_path
 from explore3d.bench.posterior.counts import run_counts
 from explore3d.bench.scenes import FIRST_BUILT_WITH
-from mapping import Feature, FloatArray, Interval, Support
+from mapping import Details, Feature, FloatArray, Interval, Support
 from mapping.inference.configuration import Places
-from mapping.inference.configuration.configuration import Configuration, fitted, part_of
+from mapping.inference.configuration.configuration import Configuration, as_bell, fitted, laid, part_of
 from mapping.inference.configuration.neighbourhood import neighbourhood
-from mapping.inference.configuration.proposals import axis_of, retold
+from mapping.inference.configuration.proposals import apart, axis_of, between, retold, stepped
 from mapping.inference.configuration.pursuit import pursued
 from mapping.inference.families import Surroundings
 from mapping.inference.kinds import feature_trace
@@ -71,3 +73,30 @@ def test_what_leaves_nothing_is_not_told_anew() -> None:
 def test_a_line_and_a_bump_that_were_told_as_two_lines_are_counted() -> None:
     case = run_counts(FIRST_BUILT_WITH + 389)
     assert case.true == 3 and not case.left_open and case.stated[3] > 0.9
+
+
+def test_two_bumps_that_were_told_as_a_short_ridge_begin_where_each_is_felt() -> None:
+    true = [_crest([(0.0, -1.3)], 0.4), _crest([(0.6, 1.5)], 0.3)]
+    told = _told_as(_crest([(0.0, -1.0), (0.4, 1.2)], 0.35), true)
+    (points,) = apart(told)
+    begun = 1e3 * np.array([axis_of(part)[0, :2] for part in points])
+    np.testing.assert_allclose(begun[np.argsort(begun[:, 1])], [[0.0, -1.3], [0.6, 1.5]], atol=0.7)
+
+
+def test_a_groove_is_asked_between_ridges_of_any_section() -> None:
+    rims = [_crest([(-8.0, y), (8.0, y)], 0.15) for y in (-2.0, 2.0)]
+    told = _told_as(rims[0], rims)
+    first, second = (part_of(rim, told.place) for rim in rims)
+    asked = laid([as_bell(first, 0.5 * told.place.half_width), second], told.place)
+    (hollow,) = [parts for parts in between(asked) if len(parts) == 3]
+    assert [part.feature.kind for part in hollow] == ["ridge", "ridge", "groove"]
+
+
+def test_a_step_is_asked_where_runs_change_their_level_and_a_bump_was_told() -> None:
+    edge = replace(_crest([(2.0, -11.0), (2.0, 11.0)], 0.4), kind="step", details=Details(high_side=1.0))
+    told = _told_as(_crest([(0.0, 0.0)], 0.3), [edge])
+    assert not told.fits
+    answers = [fitted(parts, told.place) for parts in stepped(told)]
+    best = max((answer for answer in answers if answer is not None), key=lambda answer: answer.log_odds)
+    assert best.fits and best.kinds == ("step",) and best.log_odds > told.log_odds + 100.0
+    np.testing.assert_allclose(axis_of(best.parts[0])[:, 0], 2e-3, atol=0.2e-3)

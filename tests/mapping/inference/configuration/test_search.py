@@ -11,6 +11,7 @@ import pytest
 
 from mapping.inference.configuration import search
 from mapping.inference.configuration.configuration import HOPELESS, Configuration
+from mapping.inference.configuration.neighbourhood import Neighbourhood
 from mapping.inference.configuration.proposals import Proposal
 from mapping.inference.sampler import Laplace
 
@@ -18,9 +19,11 @@ PLACE: Any = SimpleNamespace(levels=[None], window=range(10), held=())
 DETAIL: Any = SimpleNamespace(start=np.zeros(1))
 
 
-def found(parts: list[Any], gain: float) -> Any:
-    """A configuration that each detail makes likelier by so much."""
-    return SimpleNamespace(parts=parts, place=PLACE, kinds=("ridge",) * len(parts), log_odds=gain * len(parts))
+def found(parts: list[Any], gain: float, company: float = 0.0) -> Any:
+    """A configuration that each detail makes likelier by so much, and more probable by more."""
+    odds = [each * len(parts) for each in (gain, gain + company)]
+    kinds = ("ridge",) * len(parts)
+    return SimpleNamespace(parts=parts, place=PLACE, kinds=kinds, log_odds=odds[0], log_probability=odds[1])
 
 
 def more(now: Any, points: Any) -> Iterator[list[Any]]:
@@ -29,7 +32,7 @@ def more(now: Any, points: Any) -> Iterator[list[Any]]:
         yield [*now.parts, DETAIL]
 
 
-def searched(monkeypatch: pytest.MonkeyPatch, gain: float) -> tuple[search.Account, list[str]]:
+def searched(monkeypatch: pytest.MonkeyPatch, gain: float, company: float = 0.0) -> tuple[search.Account, list[str]]:
     """What a search finds by a cheap proposal, one more detail, and another, and what was asked in turn."""
     asked = []
 
@@ -40,11 +43,11 @@ def searched(monkeypatch: pytest.MonkeyPatch, gain: float) -> tuple[search.Accou
 
         return Proposal(name, generator)
 
-    monkeypatch.setattr(search, "fitted", lambda parts, place, rival=None, anew=False: found(parts, gain))
+    monkeypatch.setattr(search, "fitted", lambda parts, place, rival=None, anew=False: found(parts, gain, company))
     cheap, other = (noted(name, lambda now, points: iter(())) for name in ("cheap", "other"))
     proposals = [cheap, noted("more", more), other]
     monkeypatch.setattr(search, "FIRST", (cheap,))
-    return search.searched(found([], gain), [], np.zeros((0, 3)), proposals), asked
+    return search.searched(found([], gain, company), [], np.zeros((0, 3)), proposals), asked
 
 
 def test_what_costs_least_is_asked_again_after_each_improvement(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -56,6 +59,30 @@ def test_what_costs_least_is_asked_again_after_each_improvement(monkeypatch: pyt
 def test_what_is_better_by_less_than_counts_is_weighed_but_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
     account, _ = searched(monkeypatch, 0.3)
     assert account.best is account.start and len(account.visited) == 2
+
+
+def test_no_proposal_stays_unasked_because_another_was_asked_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search, "fitted", lambda parts, place, rival=None, anew=False: found(parts, 2.0))
+    monkeypatch.setattr(search, "FIRST", ())
+    often = Proposal("often", lambda now, points: iter([[]] * (search.MOST_FITTED + 1)))
+    account = search.searched(found([], 2.0), [], np.zeros((0, 3)), [often, Proposal("more", more)])
+    assert len(account.best.parts) == 1 and account.bounded  # the second detail would be asked for once more
+
+
+def test_what_is_probable_beside_others_is_stated_and_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    account, _ = searched(monkeypatch, -2.0, 4.0)
+    assert account.best is account.start and account.accepted == ()
+    weights = np.exp([4.0, 2.0, 0.0]) / np.exp([4.0, 2.0, 0.0]).sum()
+    assert [len(kinds) for kinds, _ in account.shares] == [2, 1, 0]
+    np.testing.assert_allclose([share for _, share in account.shares], weights)
+
+
+def test_details_are_as_probable_as_the_log_shows_others() -> None:
+    place: Any = SimpleNamespace(elsewhere=0, path=2.0, false_alarms_per_metre=0.01)
+    company = [Neighbourhood.log_company(place, details) for details in (0, 1, 2, 3)]
+    assert company == pytest.approx([0.0, 0.0, np.log(50.0), np.log(50.0) + np.log(100.0)])
+    place.elsewhere = 3
+    assert Neighbourhood.log_company(place, 1) == pytest.approx(np.log(150.0))
 
 
 def test_what_has_fewer_parameters_may_be_less_likely_at_its_best() -> None:
