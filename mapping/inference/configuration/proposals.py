@@ -547,51 +547,6 @@ def _more(now: Configuration) -> Iterator[Parts]:
         yield [*now.parts, part_of(replace(model, kind=spot.name), now.place)]
 
 
-def stepped(now: Configuration) -> Iterator[Parts]:
-    """A step where runs change their level most, beside what is there or instead of a part of it, where something is
-    left over: no crest leads to one, and what is felt at its foot is taken for a hollow or a bump.
-
-    The level of each run is free: through two or three of them a step would be drawn beside any line that ends.
-    """
-    if now.is_explained:
-        return
-    window, kind = now.place.window, kind_made_of("step", line=True)
-    for told in dict.fromkeys((now, laid([], now.place))):
-        places, rises = _changes_of_level(told.residual, now)
-        for axis in straight_lines(places, ON_LINE * now.place.half_width)[:1]:
-            near = distances(places, axis) < ON_LINE * now.place.half_width
-            if near.sum() < FEWEST_POINTS:
-                continue
-            rise = float(np.median(rises[near]))
-            up = window.normals[int(np.linalg.norm(window.feet - axis[0], axis=1).argmin())]
-            edge = _line(_sized(_model(now.place, axis[0], up, rise), kind.name, rise, 0.0), axis, now.place)
-            yield [*now.parts, edge]
-            for k in range(len(now.parts)):
-                yield [*now.parts[:k], *now.parts[k + 1 :], edge]
-
-
-def _changes_of_level(over: FloatArray, now: Configuration) -> tuple[FloatArray, FloatArray]:
-    """(M, 3) places at which runs change their level most, of those that do by PEAK_SDS, and (M,) by how much, m.
-
-    Args:
-        over: (n,) heights, m.
-        now: of which neighbourhood.
-    """
-    window, weight = now.place.window, now.place.levels[0][0].filter.scale ** 2
-    places, rises = [np.zeros((0, 3))], [np.zeros(0)]
-    for start, stop in itertools.pairwise(window.starts):
-        own, heavy = over[start:stop], weight[start:stop]
-        before, first = np.cumsum(heavy)[:-1], np.cumsum(heavy * own)[:-1]
-        behind, second = heavy.sum() - before, (heavy * own).sum() - first
-        rise = second / behind - first / before
-        strength = np.abs(rise) / np.sqrt(1.0 / before + 1.0 / behind)
-        k = int(np.argmax(strength))
-        if strength[k] > PEAK_SDS:
-            places.append(0.5 * (window.feet[start + k] + window.feet[start + k + 1])[None])
-            rises.append(np.abs(rise[k : k + 1]))
-    return np.concatenate(places), np.concatenate(rises)
-
-
 def retold(now: Configuration) -> Iterator[Parts]:
     """All details or all but one, or none, and beside them the thin crests that explain best what is felt, where the
     configuration leaves something over."""
@@ -682,7 +637,6 @@ PROPOSALS = (
     Proposal("kind", lambda now, points: other_kinds(now)),
     Proposal("extend", lambda now, points: extended(now)),
     Proposal("add", lambda now, points: more(now)),
-    Proposal("step", lambda now, points: stepped(now)),
 )
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from explore3d.bench.posterior.calibration import plate, record, straight_path
 from explore3d.bench.posterior.counts import run_counts
 from explore3d.bench.scenes import FIRST_BUILT_WITH
-from mapping import Details, Feature, FloatArray, Interval, Support
+from mapping import Feature, FloatArray, Interval, Support
 from mapping.inference.configuration import Places
 from mapping.inference.configuration.configuration import Configuration, as_bell, fitted, laid, part_of
 from mapping.inference.configuration.neighbourhood import neighbourhood
-from mapping.inference.configuration.proposals import apart, axis_of, between, retold, stepped
+from mapping.inference.configuration.proposals import apart, axis_of, between, retold
 from mapping.inference.configuration.pursuit import pursued
 from mapping.inference.families import Surroundings
 from mapping.inference.kinds import feature_trace
@@ -90,13 +88,3 @@ def test_a_groove_is_asked_between_ridges_of_any_section() -> None:
     asked = laid([as_bell(first, 0.5 * told.place.half_width), second], told.place)
     (hollow,) = [parts for parts in between(asked) if len(parts) == 3]
     assert [part.feature.kind for part in hollow] == ["ridge", "ridge", "groove"]
-
-
-def test_a_step_is_asked_where_runs_change_their_level_and_a_bump_was_told() -> None:
-    edge = replace(_crest([(2.0, -11.0), (2.0, 11.0)], 0.4), kind="step", details=Details(high_side=1.0))
-    told = _told_as(_crest([(0.0, 0.0)], 0.3), [edge])
-    assert not told.fits
-    answers = [fitted(parts, told.place) for parts in stepped(told)]
-    best = max((answer for answer in answers if answer is not None), key=lambda answer: answer.log_odds)
-    assert best.fits and best.kinds == ("step",) and best.log_odds > told.log_odds + 100.0
-    np.testing.assert_allclose(axis_of(best.parts[0])[:, 0], 2e-3, atol=0.2e-3)
