@@ -548,8 +548,8 @@ def _more(now: Configuration) -> Iterator[Parts]:
 
 
 def retold(now: Configuration) -> Iterator[Parts]:
-    """All details or all but one, or none, and beside them the thin crests that explain best what is felt, where the
-    configuration leaves something over."""
+    """All details or all but one, or the steps alone, and beside them the thin crests that explain best what is felt,
+    where the configuration leaves something over."""
     window = now.place.window
     for answer in [] if now.is_explained else pursued(now)[:MOST_RETOLD]:
         if answer.gain < -HOPELESS:

@@ -17,6 +17,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray, IntArray
 from mapping.inference.configuration.configuration import PEAK_SDS, Configuration, laid
 from mapping.inference.configuration.neighbourhood import Neighbourhood
+from mapping.inference.families import StepShape
 from mapping.inference.likelihood import Likelihood
 
 # Tops that lines are drawn through, two by two, and that square times places: a bound on time, some fits of one detail,
@@ -83,7 +84,10 @@ def pursued(now: Configuration) -> list[Answer]:
     cost = max(-float(np.log(place.false_alarms_per_metre * 2.0 * place.half_width)), 0.0)
     found: dict[tuple[tuple[int, ...], tuple[int, ...]], Answer] = {}
     own = float(likelihood.log_density(now.template[None])[0]) - cost * len(every)
-    for kept in dict.fromkeys([every, *itertools.combinations(every, max(len(every) - 1, 0)), ()]):
+    # a change of level is none of crests, however many explain it
+    steps = tuple(k for k in every if isinstance(now.parts[k].shape, StepShape))
+    fewer = itertools.combinations(every, max(len(every) - 1, 0))
+    for kept in dict.fromkeys([every, *(some for some in fewer if set(steps) <= set(some)), steps]):
         felt = laid([now.parts[k] for k in kept], place).template
         odds = likelihood.log_density(np.maximum(felt, crests.traces))
         for first in _likeliest(odds, crests, place.half_width):

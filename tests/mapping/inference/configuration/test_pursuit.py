@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from explore3d.bench.posterior.calibration import plate, record, straight_path
 from explore3d.bench.posterior.counts import run_counts
 from explore3d.bench.scenes import FIRST_BUILT_WITH
-from mapping import Feature, FloatArray, Interval, Support
+from mapping import Details, Feature, FloatArray, Interval, Support
 from mapping.inference.configuration import Places
 from mapping.inference.configuration.configuration import Configuration, as_bell, fitted, laid, part_of
 from mapping.inference.configuration.neighbourhood import neighbourhood
@@ -61,6 +63,15 @@ def test_a_bump_between_two_rows_is_pursued_where_it_is() -> None:
     told = _told_as(_crest([(0.0, -7.5), (0.0, 6.0)], 0.4), true)
     spots = [axis[0] for axis in pursued(told)[0].crests.axes if (axis[0] == axis[1]).all()]
     assert np.linalg.norm(1e3 * np.array(spots)[:, :2] - [4.0, 4.2], axis=1).min() < 0.5
+
+
+def test_a_step_is_told_as_no_crests() -> None:
+    """Fifteen ridges and bumps, one upon the other, leave what a step and a bump do, too."""
+    course = [(-1.0, -14.0), (1.0, 14.0)]
+    step = replace(_crest(course, 0.5), kind="step", details=Details(high_side=1.0))
+    told = _told_as(step, [step, _crest([(-6.0, 0.0)], 0.5)])
+    answers = pursued(told)
+    assert answers and all(answer.kept == (0,) for answer in answers)
 
 
 def test_what_leaves_nothing_is_not_told_anew() -> None:
