@@ -108,7 +108,7 @@ def _of_group(
     highest = max(group, key=lambda section: abs(section.crossing.height))
     points = np.array([section.crossing.point for section in group])
     # a round spot is felt as far across the sweeps as along them, wider than it is by what the ball adds to either side
-    if np.linalg.norm(np.ptp(points, axis=0)) <= highest.extent:
+    if np.linalg.norm(np.ptp(points, axis=0)) <= highest.extent and not _goes_on(points, group, inspection):
         alone = len({section.crossing.sweep for section in group}) == 1
         long = alone and highest.sizes.width > 2.0 * inspection.pitch
         if long or _is_long(highest, group, inspection):
@@ -147,6 +147,31 @@ def _is_long(highest: FreeSection, group: Sequence[FreeSection], inspection: Ins
     middle = np.mean([crossing.point for crossing in whole], axis=0)
     places = inspection.near(middle[None], 0.5 * highest.half_extent)
     return len(high.union(inspection.sweep[places].tolist())) > len(high) + 2
+
+
+def _goes_on(points: FloatArray, group: Sequence[FreeSection], inspection: Inspection) -> bool:
+    """True of sections (N,) at points (N, 3) of which no sweep saw an end on either side, and whose widths are those of
+    a line rather than the chords of a round spot.
+
+    Chords of a circle of width W about a place s0 along the line through all have w^2 = W^2 - 4 (s - s0)^2: with 4 s^2
+    added that is linear in s, of two parameters as unknown as the one width of a line. Two sections tell neither.
+    """
+    if len({section.crossing.sweep for section in group}) < FEWEST_VARYING:
+        return False
+    middle = points.mean(axis=0)
+    s = (points - middle) @ np.linalg.svd(points - middle, full_matrices=False)[2][0]
+    width = np.array([section.sizes.width for section in group])
+    doubt = np.hypot([section.sizes.width_sd for section in group],
+                     [section.piece.spacing / np.sqrt(6.0) for section in group])  # fmt: skip
+    weight = 1.0 / doubt
+    off_line = weight * (width - np.average(width, weights=weight**2))
+    design, chords = np.column_stack([np.ones(len(s)), s]), width**2 + 4.0 * s**2
+    weight = weight / (2.0 * width)
+    off_spot = weight * (chords - design @ np.linalg.lstsq(design * weight[:, None], chords * weight, rcond=None)[0])
+    if float(off_line @ off_line) >= float(off_spot @ off_spot):
+        return False
+    ends, height = points[[s.argmin(), s.argmax()]], float(np.median([section.crossing.height for section in group]))
+    return not any(_end(axis, height, float(np.median(width)), inspection).seen for axis in (ends, ends[::-1]))
 
 
 def _through(points: FloatArray, core: float) -> FloatArray:
