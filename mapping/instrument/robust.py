@@ -56,8 +56,8 @@ def robust_fit(design: FloatArray, values: FloatArray, scale: float) -> RobustFi
     """Least squares that ignores what stands out by more than a few times `scale`.
 
     The first rounds minimise the sum of absolute residuals (convex: a feature that covers a third of the
-    data cannot trap it), the rest Tukey's bisquare at the given scale. There are more of
-    the first where a feature stands off by 1e9 of the scale, as in data without noise.
+    data cannot trap it), the rest Tukey's bisquare at the given scale. There are more of the
+    first where a feature stands off by 1e9 of the scale, as in data without noise.
 
     Args:
         design: (N, P) matrix.

@@ -107,18 +107,21 @@ def dropped_crossings(
 def _felt_together(crossings: Sequence[Crossing], lone: BoolArray) -> list[list[int]]:
     """Numbers of lone crossings (n,) of one kind whose disturbances touch, group by group: noise makes one crossing
     clear of it where its law is heavy, but not several beside each other in different sweeps."""
-    left, groups = [int(k) for k in np.flatnonzero(lone)], []
-    while left:
-        group = [left.pop(0)]
-        for k in group:  # grows while it is gone through
-            one = crossings[k]
-            near = [m for m in left if crossings[m].kind == one.kind and crossings[m].sweep != one.sweep]
-            near = [
-                m
-                for m in near
-                if np.linalg.norm(crossings[m].point - one.point) < crossings[m].half_width + one.half_width
-            ]
-            group += near
-            left = [m for m in left if m not in near]
-        groups.append(sorted(group))
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    left = [int(k) for k in np.flatnonzero(lone)]
+    if not left:
+        return []
+    points, reach = (np.array([getattr(crossings[k], name) for k in left]) for name in ("point", "half_width"))
+    sweep, kind = (np.array([getattr(crossings[k], name) for k in left]) for name in ("sweep", "kind"))
+    one, other = cKDTree(points).query_pairs(2.0 * float(reach.max()), output_type="ndarray").T
+    touch = np.linalg.norm(points[one] - points[other], axis=1) < reach[one] + reach[other]
+    touch &= (kind[one] == kind[other]) & (sweep[one] != sweep[other])
+    links = one[touch], other[touch]
+    count, group = connected_components(coo_array((np.ones(len(links[0])), links), shape=(len(left), len(left))))
+    groups: list[list[int]] = [[] for _ in range(count)]
+    for k, number in zip(left, group, strict=True):
+        groups[number].append(k)
     return groups
