@@ -18,11 +18,11 @@ BARE_MARGIN = 0.3
 # Bins of a sweep that was not made yet; and the step of a derivative, in half-widths, heights and rad
 FORETOLD_BINS, DERIVATIVE_STEP = 40, 1e-3
 # A base under a sweep may lie and slope by so many times what is felt of the line, or a sample's noise: the model gives
-# every sweep its own, too (mapping.inference.families.problem). That is as good as free: of a wire of 0.65 mm in 0.06 mm
-# noise 0.3 and 30 leave the end as well known to 0.2 %, with the same sweep chosen
+# every sweep its own, too (mapping.inference.families.problem). That is as good as free: of a wire of 0.65 mm in 0.06
+# mm noise 0.3 and 30 leave the end as well known to 0.2 %, with the same sweep chosen
 VAGUE = 3.0
 # Shares of the time that two sweeps may have, to be made in turn until enough is known; and how long that may take, in
-# times of the shortest one: steps that tell it to a fifth, up to 300 times, beyond which an end is left as it is known
+# times of the shortest one: steps that tell it to a fifth, up to 300 times; beyond that what comes nearest is made
 TIME_SHARES = np.array([0.25, 0.5, 0.75])
 FORETOLD_TIMES = 2.0 * 1.4 ** np.arange(16)
 # Standard deviations of chi-squared beyond which something else is felt than a line that ends
