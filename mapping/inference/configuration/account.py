@@ -24,6 +24,7 @@ from mapping.inference.configuration.neighbourhood import (
 )
 from mapping.inference.configuration.proposals import (
     PROPOSALS,
+    REMOVE,
     Proposal,
     apart_of,
     as_far_as_felt,
@@ -109,7 +110,14 @@ def accounted(
             block.explained = all(known[k].explained for k in block.origins)
         # what was left behind by something that is weighed elsewhere now is another number than was told with it
         met = {k for block in blocks if len(block.origins) > 1 for k in block.origins}
-        weighed = [block for block in blocks if not again or met & block.origins]
+        weighed = []
+        for block in blocks:
+            same = _known_as(block, known, origin) if again else None
+            if same is not None:
+                block.felt, block.explained = same.felt, same.explained
+                block.features = [_noted(feature, (IN_BLOCKS,)) for feature in block.features]
+            elif not again or met & block.origins:
+                weighed.append(block)
         known_in_all = len(rest) + len(bars) + sum(len(block.features) for block in blocks)
         for _ in range(LAID_ROUNDS):
             for block in weighed:
@@ -133,7 +141,7 @@ def accounted(
             left = [spot for spot in left if not _explains(best, spot)]
             noted = again and block.cut
             block.features = [_noted(feature, (IN_BLOCKS,)) for feature in improved] if noted else improved
-            block.explained = best.fits
+            block.explained, block.changed = best.fits, best is not block.laid[1]
             block.felt = _described(best, around) if len(blocks) > 1 else improved
         known = blocks
     return [*rest, *(feature for block in known for feature in block.features)], left
@@ -149,6 +157,7 @@ class _Block:
         cut: True if it is not the whole of its neighbourhood.
         explained: True if what it holds leaves no more than noise, as far as that was asked.
         understood: False if so many places tell of it that one fit would take what is there for all of them.
+        changed: True if a proposal improved it.
         felt: its features where they are likeliest by now, as they are held beside others.
         beside: what was held beside it when it was laid out; None: it was not yet.
         laid: its parts as the rules left them, and the same where they are likeliest; None if too few places tell of
@@ -161,9 +170,20 @@ class _Block:
     cut: bool = False
     explained: bool = True
     understood: bool = True
+    changed: bool = False
     felt: list[Feature] = field(default_factory=list)
     beside: list[Feature] | None = None
     laid: tuple[list[Part], Configuration] | None = None
+
+
+def _known_as(block: _Block, known: Sequence[_Block], origin: dict[int, int]) -> _Block | None:
+    """The block of the look before that has the same features; None if there is none, or anything about it changed."""
+    before = {origin[id(feature)] for feature in block.features}
+    if not block.cut or len(before) != 1:
+        return None
+    (k,) = before
+    whole = len(known[k].features) == len(block.features)
+    return known[k] if whole and not any(known[m].changed for m in block.origins - before) else None
 
 
 def _beside(
@@ -246,6 +266,10 @@ def _improved(
     """The features of one block, as they are or better, and the configuration of the highest odds."""
     group = block.features
     if _is_plain(start):
+        # it was detected over the bare base: beside others that explain what was felt there it may be nothing
+        alone = searched(start, parts, np.zeros((0, 3)), [REMOVE]).best if start.place.held else start
+        if not alone.parts:
+            return [], alone
         return [_with_odds(feature, (), ()) for feature in _bent_as_fitted(group, start, around)], start
     points = [c.point for c in block.crossings if c.kind == "convex"]
     points += [

@@ -30,6 +30,9 @@ from mapping.inference.configuration.account import (
     _beside,
     _Block,
     _holding,
+    _improved,
+    _known_as,
+    _laid_out,
     accounted,
 )
 from mapping.inference.configuration.configuration import (
@@ -43,6 +46,7 @@ from mapping.inference.configuration.configuration import (
 )
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood, window_of
 from mapping.inference.configuration.proposals import (
+    PROPOSALS,
     _course_of,
     as_point,
     chained,
@@ -259,6 +263,31 @@ def test_a_bar_that_is_measured_is_held_beside_what_it_reaches_into() -> None:
         for held in (place, _holding([bar], place))
     ]
     assert left[0] > 0.9 * true.height > 0.2 * true.height > left[1]
+
+
+def test_what_was_detected_where_others_explain_what_is_felt_is_nothing() -> None:
+    (wire,) = (_true(true) for true in classified_body("ridge", FIRST_BUILT_WITH).truth)
+    along = (wire.axis[-1] - wire.axis[0]) / np.linalg.norm(wire.axis[-1] - wire.axis[0])
+    aside = wire.axis.mean(axis=0) + 2e-3 * np.cross(along, [0.0, 0.0, 1.0])
+    edge = replace(wire, kind="step", axis=aside + 5e-3 * np.outer([-1.0, 1.0], along), normals=wire.normals[:2])
+    place = _weighed_on("ridge", [edge])
+    told = []
+    for beside in ([], [wire]):
+        block = _Block([edge], [], frozenset())
+        parts, start = _laid_out(block.features, _holding(beside, place))
+        told.append([each.kind for each in _improved(block, parts, start, place.around, PROPOSALS)[0]])
+    assert told[0] and told[1] == []
+
+
+def test_a_part_of_a_crowd_that_nothing_changed_about_is_not_weighed_twice() -> None:
+    lines = [_true(each) for each in classified_body("wires 2 mm apart", FIRST_BUILT_WITH).truth]
+    known = [_Block([line], [], frozenset(), cut=True) for line in lines]
+    origin = {id(line): k for k, line in enumerate(lines)}
+    again = _Block(lines[:1], [], frozenset((0, 1)), cut=True)
+    assert _known_as(again, known, origin) is known[0]
+    assert _known_as(_Block(lines, [], frozenset((0, 1)), cut=True), known, origin) is None
+    known[1].changed = True
+    assert _known_as(again, known, origin) is None
 
 
 def test_pieces_of_a_line_are_joined_with_their_section() -> None:
