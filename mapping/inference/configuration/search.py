@@ -188,9 +188,9 @@ class _Search:
             if found is best and partly is not None and not best.fits:  # what that leaves is told anew once more
                 found, _ = self._better(best, proposal, partly, by)
             if found is not best:
-                best, waiting, idle = found, list(first), 0
+                explains, best, waiting, idle = found.fits and not best.fits, found, list(first), 0
                 self.accepted.append(proposal.name)
-                if proposal is RETELL:  # from there the search begins anew
+                if proposal is RETELL or explains:  # from there the search begins anew
                     self.spent.fits, self.bounded = 0.0, False
         return best
 
@@ -202,7 +202,7 @@ class _Search:
         found, spent = best, self.spent
         partly: Configuration | None = None
         for proposed in _yielded(proposal, begun, self.points):
-            if self._ends(proposal):
+            if self._ends(proposal, best):
                 self.bounded = True
                 break
             other = fitted(proposed, best.place, best)
@@ -220,12 +220,13 @@ class _Search:
                     break
         return found, partly
 
-    def _ends(self, proposal: Proposal) -> bool:
+    def _ends(self, proposal: Proposal, best: Configuration) -> bool:
         """True if no more of a proposal is tried. What does not pay for itself goes, and what is left over is told
-        anew, however many there are; no proposal stays unasked because others were asked often."""
+        anew, however many there are; no proposal stays unasked because others were asked often, or while something
+        is left to explain."""
         if proposal in (REMOVE, RETELL):
             return self.spent.too_much
-        return self.spent.enough if self.asked[proposal.name] > 1 else self.spent.all_work
+        return self.spent.enough if best.fits and self.asked[proposal.name] > 1 else self.spent.all_work
 
 
 @dataclass(eq=False)

@@ -19,11 +19,13 @@ PLACE: Any = SimpleNamespace(levels=[None], window=range(10), held=())
 DETAIL: Any = SimpleNamespace(start=np.zeros(1))
 
 
-def found(parts: list[Any], gain: float, company: float = 0.0) -> Any:
-    """A configuration that each detail makes likelier by so much, and more probable by more."""
+def found(parts: list[Any], gain: float, company: float = 0.0, details: int = 0) -> Any:
+    """A configuration that each detail makes likelier by so much, and more probable by more; of fewer details than
+    there are it does not fit."""
     odds = [each * len(parts) for each in (gain, gain + company)]
     kinds = ("ridge",) * len(parts)
-    return SimpleNamespace(parts=parts, place=PLACE, kinds=kinds, log_odds=odds[0], log_probability=odds[1])
+    fits = len(parts) >= details
+    return SimpleNamespace(parts=parts, place=PLACE, kinds=kinds, log_odds=odds[0], log_probability=odds[1], fits=fits)
 
 
 def more(now: Any, points: Any) -> Iterator[list[Any]]:
@@ -67,6 +69,18 @@ def test_no_proposal_stays_unasked_because_another_was_asked_often(monkeypatch: 
     often = Proposal("often", lambda now, points: iter([[]] * (search.MOST_FITTED + 1)))
     account = search.searched(found([], 2.0), [], np.zeros((0, 3)), [often, Proposal("more", more)])
     assert len(account.best.parts) == 1 and account.bounded  # the second detail would be asked for once more
+
+
+def test_the_search_goes_on_while_something_is_left_to_explain(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search, "FIRST", ())
+    often = Proposal("often", lambda now, points: iter([[]] * (search.MOST_FITTED + 1)))
+    for details, told in ((0, 1), (2, 2)):
+        monkeypatch.setattr(
+            search, "fitted", lambda parts, place, rival=None, anew=False, n=details: found(parts, 2.0, 0.0, n)
+        )
+        start = found([], 2.0, 0.0, details)
+        account = search.searched(start, [], np.zeros((0, 3)), [often, Proposal("more", more)])
+        assert len(account.best.parts) == told
 
 
 def test_what_is_probable_beside_others_is_stated_and_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
