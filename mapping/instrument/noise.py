@@ -263,6 +263,8 @@ def estimate_noise(residual: ArrayLike, s: ArrayLike) -> Noise:
 def _mean_variance(x: FloatArray) -> FloatArray:
     """Variance of the mean of a unit process over x = rate times length; series where the form cancels."""
     near = np.abs(x) < SERIES_LIMIT
+    if not near.any():
+        return np.asarray(2 * ((x + np.expm1(-x)) / x) / x)
     safe, close = np.where(near, SERIES_LIMIT, x), np.where(near, x, SERIES_LIMIT)
     series = np.polynomial.polynomial.polyval(close, 2.0 * SIGNS / FACTORIALS)
     return np.where(near, series, 2 * ((safe + np.expm1(-safe)) / safe) / safe)
