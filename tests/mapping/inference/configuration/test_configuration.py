@@ -281,25 +281,44 @@ def test_pieces_of_a_line_are_joined_with_their_section() -> None:
 
 def test_pieces_of_a_groove_are_joined_as_one_whose_walls_run_out_too() -> None:
     """Two upright grooves that lie over each other at a slant leave more of such a trace than one upright one does."""
-    trace, base = _cosine_groove(10e-6, 2)
-    up = np.tile([0.0, 0.0, 1.0], (len(trace), 1))
-    height, width = Interval(-0.33e-3, -0.35e-3, -0.3e-3), Interval(3e-3, 2e-3, 4e-3)
-    length, sides = Interval(10e-3, 9e-3, 11e-3), ((-0.3, -5.0, 0.3, 2.0), (0.3, -2.0, -0.3, 5.0))
-    pieces = [
-        Feature("groove", 1e-3 * np.array([[x, y, 0.0], [u, v, 0.0]]), up[:2], height, width, length, Support(99.0, 9),
-                True, 2e-5)
-        for x, y, u, v in sides
-    ]  # fmt: skip
-    feet, own = trace.centers - [0.0, 0.0, trace.tip_radius], slice(None, None, 10)
-    samples = np.ones(len(feet[own]), dtype=np.int64)
-    places = Places(feet[own] * [1.0, 1.0, 0.0], up[own], feet[own, 2], samples, trace.sweep[own], 0.2e-3)
-    place = neighbourhood(pieces, [], places, Surroundings(trace, base, Noise(10e-6, 0.0, 1e-3)), 0.01)
-    assert place is not None
+    place, pieces = _upright_grooves((-0.3, -5.0, 0.3, 2.0), (0.3, -2.0, -0.3, 5.0))
     now = laid([part_of(piece, place, 1) for piece in pieces], place)
     whole = {type(parts[0].shape): parts for parts in chained(now) if parts[0].shape.modes.degree == 1}
     assert set(whole) == {GrooveShape, SmoothGrooveShape}
     pair, smooth = fitted(now.parts, place), fitted(whole[SmoothGrooveShape], place)
     assert pair is not None and smooth is not None and smooth.log_odds > pair.log_odds + 10.0
+
+
+def test_a_groove_whose_walls_run_out_ends_half_a_mouth_short_of_an_upright_one() -> None:
+    place, (groove,) = _upright_grooves((0.0, -5.0, 0.0, 5.0))
+    upright = part_of(groove, place, 1)
+    smooth = as_smooth([upright], 0, place)
+    ends = [part.start[part.shape.names.index("start") :][:2] for part in (upright, smooth)]
+    half = 0.5 * np.exp(upright.start[upright.shape.names.index("log width")])
+    np.testing.assert_allclose(ends[1] - ends[0], [half, -half], rtol=1e-9)
+    place, (short,) = _upright_grooves((0.0, -0.3, 0.0, 0.3))
+    smooth = as_smooth([part_of(short, place, 1)], 0, place)
+    start, end = smooth.start[smooth.shape.names.index("start") :][:2]
+    assert start == end
+
+
+def _upright_grooves(*courses: tuple[float, float, float, float]) -> tuple[Neighbourhood, list[Feature]]:
+    """Grooves along courses (x, y, x, y; mm) of 0.33 x 3 mm over a cosine groove 10.4 mm long, and where they lie."""
+    trace, base = _cosine_groove(10e-6, 2)
+    up = np.tile([0.0, 0.0, 1.0], (len(trace), 1))
+    height, width = Interval(-0.33e-3, -0.35e-3, -0.3e-3), Interval(3e-3, 2e-3, 4e-3)
+    length = Interval(10e-3, 9e-3, 11e-3)
+    grooves = [
+        Feature("groove", 1e-3 * np.array([[x, y, 0.0], [u, v, 0.0]]), up[:2], height, width, length, Support(99.0, 9),
+                True, 2e-5)
+        for x, y, u, v in courses
+    ]  # fmt: skip
+    feet, own = trace.centers - [0.0, 0.0, trace.tip_radius], slice(None, None, 10)
+    samples = np.ones(len(feet[own]), dtype=np.int64)
+    places = Places(feet[own] * [1.0, 1.0, 0.0], up[own], feet[own, 2], samples, trace.sweep[own], 0.2e-3)
+    place = neighbourhood(grooves, [], places, Surroundings(trace, base, Noise(10e-6, 0.0, 1e-3)), 0.01)
+    assert place is not None
+    return place, grooves
 
 
 def test_a_crest_of_no_height_stands_out_of_no_edge() -> None:
