@@ -269,6 +269,8 @@ def test_pieces_of_a_line_are_joined_with_their_section() -> None:
         replace(groove, axis=np.stack([groove.axis[0], middle - 1e-3 * np.eye(3)[0]]), normals=up),
         replace(groove, axis=np.stack([middle + 1e-3 * np.eye(3)[0], groove.axis[-1]]), normals=up),
     ]
+    more = replace(groove.evidence, snr=groove.evidence.snr + 1.0)  # the whole has the section of what stands out most
+    pieces[0] = replace(pieces[0], evidence=more)
     place = _weighed_on(body, [groove])
     first = as_smooth([part_of(pieces[0], place)], 0, place)
     now = laid([first, part_of(pieces[1], place)], place)
