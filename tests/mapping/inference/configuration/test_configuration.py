@@ -291,6 +291,15 @@ def test_pieces_of_a_groove_are_joined_as_one_whose_walls_run_out_too() -> None:
     assert pair is not None and smooth is not None and smooth.log_odds > pair.log_odds + 10.0
 
 
+def test_no_lone_groove_is_asked_as_a_closed_one_whose_walls_run_out() -> None:
+    place, (groove,) = _upright_grooves((0.0, -5.0, 0.0, 5.0))
+    turn = np.linspace(0.0, 1.6 * np.pi, 40)
+    course = 3e-3 * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(40)])
+    ring = replace(groove, axis=course, normals=np.tile([0.0, 0.0, 1.0], (40, 1)))
+    wholes = [parts[0] for parts in chained(laid([part_of(ring, place)], place))]
+    assert wholes and all(whole.feature.closed and type(whole.shape) is GrooveShape for whole in wholes)
+
+
 def test_a_groove_whose_walls_run_out_ends_half_a_mouth_short_of_an_upright_one() -> None:
     place, (groove,) = _upright_grooves((0.0, -5.0, 0.0, 5.0))
     upright = part_of(groove, place, 1)
