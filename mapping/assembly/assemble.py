@@ -12,7 +12,7 @@ from mapping.assembly.details import along_rested, details_of, made_of
 from mapping.assembly.edges import between_levels, edge_features, step_features
 from mapping.assembly.faint_features import faint_spacing, why_none_sought, with_faint_lines
 from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
-from mapping.assembly.free import free_sections, free_spot, outweighed, round_lines
+from mapping.assembly.free import free_sections, free_spot, outweighed, round_lines, uncrossed
 from mapping.assembly.free_lines import free_lines, lies_on
 from mapping.assembly.lines import Around
 from mapping.assembly.linking import Inspection, Inspections, groups
@@ -113,7 +113,7 @@ def assemble(
         wide = [feature for feature in wide if feature not in alone or feature in left]
     if faint:
         features = with_faint_lines(features, detections, laid, base, false_alarms_per_metre, inspections)
-    return _strongest_first([*wide, *round_it, *features])
+    return _strongest_first([*wide, *uncrossed(round_it, features, laid.tip_radius), *features])
 
 
 def _off_lines(

@@ -279,17 +279,17 @@ def _improved(
     odds = _told(found)
     noted = tuple(note for note, is_so in ((ENDED_EARLY, found.bounded), (UNEXPLAINED, not found.best.fits)) if is_so)
     odds = odds if found.best.fits else ()  # among configurations that are all wrong none is probable
-    adds = len(found.best.kinds) > len(found.start.kinds)
+    best = found.best if found.best.fits else _not_of_misfit(found)
     # a section or a course alone is the posterior's to choose, but where it begins decides what it finds
     solves = found.best.fits and not found.start.fits
     later = set(found.accepted) <= CHOSEN_LATER and found.best.kinds == found.start.kinds and not solves
-    if later or (adds and not found.best.fits and not _pays_beside_misfit(found)):
+    if later or best is found.start:
         laid = _bent_as_fitted(group, found.start, around)
         felt = [_felt_by_runs(feature, found.start.runs(k)) for k, feature in enumerate(laid)]
         return [_with_odds(feature, odds, noted) for feature in felt], found.best
     algorithms = group[0].evidence.algorithms if group else ()
-    features = [_with_odds(feature, odds, noted) for feature in _described(found.best, around, algorithms)]
-    return _meeting(features, around.trace.tip_radius), found.best
+    features = [_with_odds(feature, odds, noted) for feature in _described(best, around, algorithms)]
+    return _meeting(features, around.trace.tip_radius), best
 
 
 def _bent_as_fitted(group: Sequence[Feature], start: Configuration, around: Surroundings) -> list[Feature]:
@@ -308,11 +308,18 @@ def _bends(feature: Feature, around: Surroundings) -> bool:
     return bool(distances(feature.axis, feature.axis[[0, -1]]).max() > half)
 
 
-def _pays_beside_misfit(found: Account) -> bool:
+def _not_of_misfit(found: Account) -> Configuration:
+    """The best of a search that leaves more than noise, or the plainest that it came through, where the details that
+    were added to this do not pay beside its misfit."""
+    best, plainest = found.best, found.plainest
+    adds = len(best.kinds) > len(plainest.kinds)
+    return plainest if adds and not _pays_beside_misfit(best, plainest) else best
+
+
+def _pays_beside_misfit(best: Configuration, start: Configuration) -> bool:
     """True if what was added to a configuration that does not fit either way pays for itself as if what is left over
     were noise: of an unknown level, and one number for each half-width of path, over which a shape is wrong as a whole
     (Schwarz, Annals of Statistics 6, 1978)."""
-    best, start = found.best, found.start
     looks = float(2.0 * best.place.window.half.sum()) / best.place.half_width
     left, before = (float(white @ white) for white in (each.white_residual for each in (best, start)))
     more = len(best.found.mean) - len(start.found.mean)

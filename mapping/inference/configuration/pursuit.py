@@ -157,7 +157,7 @@ def crests_of(now: Configuration) -> Crests:
     length = np.linalg.norm(across, axis=1)
     # a spot of height h between two rows is felt h - d^2 / 2R on each, which says how far it is from both
     radius = tip + 0.5 * np.maximum(height[i], height[j])
-    share = 0.5 + radius * (height[j] - height[i]) / np.maximum(length, np.finfo(float).tiny) ** 2
+    share = 0.5 + radius * (height[j] - height[i]) / np.maximum(length**2, np.finfo(float).tiny)
     inside = (run[i] != run[j]) & (np.abs(share - 0.5) < 0.5)
     inside &= length < 2.0 * np.sqrt(2.0 * tip * np.maximum(height[i], height[j]))
     between = feet[i] + share[:, None] * across

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from mapping.inference.configuration import search
+from mapping.inference.configuration.account import _not_of_misfit
 from mapping.inference.configuration.configuration import HOPELESS, Configuration
 from mapping.inference.configuration.neighbourhood import Neighbourhood
 from mapping.inference.configuration.proposals import Proposal
@@ -89,6 +90,22 @@ def test_what_is_probable_beside_others_is_stated_and_not_told(monkeypatch: pyte
     weights = np.exp([4.0, 2.0, 0.0]) / np.exp([4.0, 2.0, 0.0]).sum()
     assert [len(kinds) for kinds, _ in account.shares] == [2, 1, 0]
     np.testing.assert_allclose([share for _, share in account.shares], weights)
+
+
+def test_details_that_were_added_on_the_way_pay_beside_the_misfit_or_are_not_told() -> None:
+    """One groove that stands for three pieces leaves more than noise, of which a pit explains little or much."""
+    place: Any = SimpleNamespace(window=SimpleNamespace(half=np.full(1000, 0.2e-3)), half_width=1.3e-3)
+
+    def left(kinds: tuple[str, ...], square: float) -> Any:
+        white, prior = np.full(1000, np.sqrt(square)), -8.0 * len(kinds)
+        fitted = SimpleNamespace(mean=np.zeros(4 * len(kinds)))
+        return SimpleNamespace(kinds=kinds, place=place, white_residual=white, log_prior=prior, found=fitted)
+
+    pieces, whole, pit = left(("groove",) * 3, 3.6), left(("groove",), 1.9), ("groove", "pit")
+    for square, told in ((1.8, whole.kinds), (1.2, pit)):
+        best = left(pit, square)
+        account = search.Account(pieces, best, (), ("one course", "add"), (whole, best))
+        assert account.plainest is whole and _not_of_misfit(account).kinds == told
 
 
 def test_details_are_as_probable_as_the_log_shows_others() -> None:
