@@ -23,10 +23,11 @@ from mapping.base.quadrics import (
 )
 from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit, robust_scale
 
-# Cells whose heights are compared lie the first of these shares of the cloud's extent apart that tells the slope: by it
-# several levels are found, or one that holds most cells. Of a staircase of n edges, n eighths of the pairs an eighth
-# apart stand on two levels: the sum of absolute residuals finds the slope as long as these are less than half, that is
-# up to three edges one way. Nearer pairs tell less of it, but beside as many edges as there may be levels
+# Cells whose heights are compared lie one of these shares of the cloud's extent apart: each is asked for the slope, and
+# the likeliest field stands. Of a staircase of n edges, n eighths of the pairs an eighth apart stand on two levels: the
+# sum of absolute residuals finds the slope as long as these are less than half, that is up to three edges one way.
+# Nearer pairs tell less of it, but beside as many edges as there may be levels; and edges that come again as often as
+# the cells lie apart make another slope of it, on which the teeth seem to scatter about one level
 PAIRS_APART = (1 / 8, 1 / 16, 1 / 32)
 # Of all cells so many must have a partner. Where lines are so far apart that it must be half the extent away, or all of
 # it between two, half of the cells can have one at most; a fifth of these may lie off the path
@@ -80,26 +81,24 @@ def terraced_quadric(cloud: Cloud) -> Fitted | None:
 def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
     """A height field z = design(x, y) @ coefficients + one of a few levels, or None where one level is enough.
 
-    The field's slopes come from differences of heights of cells that lie apart, of which most stand on one level. A
-    level counts if the cells on it gain more than its height and the places of its edges cost. The field of the level
-    with the most cells is the base; the others are what detection finds as steps.
+    The field's slopes come from differences of heights of cells that lie apart (`PAIRS_APART`), of which most stand on
+    one level. A level counts if the cells on it gain more than its height and the places of its edges cost. The field
+    of the level with the most cells is the base; the others are what detection finds as steps.
     Cells on a level may differ by what the cells of such pairs do, or by more where a level holds more (drift goes on
     beyond the pairs' distance), and as many count as are independent then: roughness and drift are no levels, however
     smooth from cell to cell.
     """
+    fits = list[Fitted]()
     for apart in PAIRS_APART:
         pairs = _pairs(cloud, apart)
         if pairs is None:
-            return None
-        fit, held = _by_pairs(design, kind, cloud, *pairs)
-        if fit is not None or held > 0.5:
-            return fit
-    return None
+            break
+        fits += [fit for fit in [_by_pairs(design, kind, cloud, *pairs)] if fit is not None]
+    return min(fits, key=lambda fit: fit.cost(cloud.scale), default=None)
 
 
-def _by_pairs(design: Design, kind: str, cloud: Cloud, one: IntArray, other: IntArray) -> tuple[Fitted | None, float]:
-    """The field whose slopes are those between cells (P,) and others (P,), None where one level is enough, and the
-    share of all cells that its fullest level holds to begin with."""
+def _by_pairs(design: Design, kind: str, cloud: Cloud, one: IntArray, other: IntArray) -> Fitted | None:
+    """The field whose slopes are those between cells (P,) and others (P,); None where one level is enough."""
     x, y, z = cloud.points.T
     columns = design(x, y)
     # what differences cannot tell, the constant, comes out as zero: the levels hold it
@@ -107,10 +106,9 @@ def _by_pairs(design: Design, kind: str, cloud: Cloud, one: IntArray, other: Int
     rest = z - columns @ slopes
     paired = max(cloud.scale, robust_scale(rest[one] - rest[other]) / np.sqrt(2.0))
     levels = _levels(rest, cloud, paired)
-    held = float(np.mean(levels.level == 0))
     for _ in range(LEVEL_ROUNDS):
         if len(levels.heights) < 2:
-            return None, held
+            return None
         on = np.maximum(levels.level, 0)
         fit = robust_fit(columns, z - levels.heights[on], cloud.scale)
         before, rest = levels, z - columns @ fit.coefficients
@@ -118,21 +116,20 @@ def _by_pairs(design: Design, kind: str, cloud: Cloud, one: IntArray, other: Int
         if np.array_equal(before.level, levels.level):
             break
     if len(levels.heights) < 2:
-        return None, held
+        return None
     on = np.maximum(levels.level, 0)
     lowered = replace(cloud, points=np.column_stack([x, y, z - levels.heights[on]]))
     flat = height_field(design, kind, lowered)
     # along the field's normal in the middle, not along the axis of a cloud that the step itself tilts
     slope = np.asarray(flat.parameters["coefficients"], dtype=np.float64)[1:3]
     heights = levels.heights / np.sqrt(1.0 + slope @ slope)
-    terraces = replace(
+    return replace(
         flat,
         parameters=flat.parameters | {"levels": heights.tolist()},
         freedom=flat.freedom + levels.freedom,
         # rows that each stand on a level of their own may be those of any body
         explains=levels.edges >= len(levels.heights) - 1,
     )
-    return terraces, held
 
 
 def _pairs(cloud: Cloud, apart: float) -> tuple[IntArray, IntArray] | None:
