@@ -28,15 +28,15 @@ from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit, robust_scale
 # sum of absolute residuals finds the slope as long as these are less than half, that is up to three edges one way.
 # Nearer pairs tell less of it, but beside as many edges as there may be levels; and edges that come again as often as
 # the cells lie apart make another slope of it, on which the teeth seem to scatter about one level
-PAIRS_APART = (1 / 8, 1 / 16, 1 / 32)
+PAIRS_APART = (1 / 8, 1 / 16, 1 / 32, 1 / 64)
 # Of all cells so many must have a partner. Where lines are so far apart that it must be half the extent away, or all of
 # it between two, half of the cells can have one at most; a fifth of these may lie off the path
 FEWEST_PAIRS = 0.4
 # Of a run's samples, the share that is its end: the detail itself lies in the middle, and a median minds nothing that
 # reaches into less than half of an end
 END_SHARE = 8
-# More levels than that have no two cells an eighth of the extent from each other on one of them
-MOST_LEVELS = 8
+# More levels than that have no two cells of the nearest pairs on one of them
+MOST_LEVELS = round(1 / PAIRS_APART[-1])
 # Mean square, in standard deviations, up to which what lies about a height (FEATURE_RESIDUAL_SDS to either side) is as
 # likely to scatter about it as to lie anywhere there: 2 log(2 FEATURE_RESIDUAL_SDS / sqrt(2 pi)). Of a level it is 1,
 # of a crest or a flank that passes through the height 3 and more
