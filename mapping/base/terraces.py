@@ -88,17 +88,23 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
     beyond the pairs' distance), and as many count as are independent then: roughness and drift are no levels, however
     smooth from cell to cell.
     """
-    fits = list[Fitted]()
+    best: Fitted | None = None
+    price = float(np.log(len(cloud.points)))  # of one parameter: by less none is likelier, and near pairs tell less
     for apart in PAIRS_APART:
         pairs = _pairs(cloud, apart)
         if pairs is None:
             break
-        fits += [fit for fit in [_by_pairs(design, kind, cloud, *pairs)] if fit is not None]
-    return min(fits, key=lambda fit: fit.cost(cloud.scale), default=None)
+        fit, held = _by_pairs(design, kind, cloud, *pairs)
+        if fit is None and held > 0.5:
+            break
+        if fit is not None and (best is None or fit.cost(cloud.scale) < best.cost(cloud.scale) - price):
+            best = fit
+    return best
 
 
-def _by_pairs(design: Design, kind: str, cloud: Cloud, one: IntArray, other: IntArray) -> Fitted | None:
-    """The field whose slopes are those between cells (P,) and others (P,); None where one level is enough."""
+def _by_pairs(design: Design, kind: str, cloud: Cloud, one: IntArray, other: IntArray) -> tuple[Fitted | None, float]:
+    """The field whose slopes are those between cells (P,) and others (P,), None where one level is enough, and the
+    share of all cells that its fullest level holds to begin with, no farther off it than the cells of pairs scatter."""
     x, y, z = cloud.points.T
     columns = design(x, y)
     # what differences cannot tell, the constant, comes out as zero: the levels hold it
@@ -106,9 +112,11 @@ def _by_pairs(design: Design, kind: str, cloud: Cloud, one: IntArray, other: Int
     rest = z - columns @ slopes
     paired = max(cloud.scale, robust_scale(rest[one] - rest[other]) / np.sqrt(2.0))
     levels = _levels(rest, cloud, paired)
+    reach = FEATURE_RESIDUAL_SDS * paired
+    held = float(np.mean(np.abs(rest - _densest(np.sort(rest), reach)) < reach))
     for _ in range(LEVEL_ROUNDS):
         if len(levels.heights) < 2:
-            return None
+            return None, held
         on = np.maximum(levels.level, 0)
         fit = robust_fit(columns, z - levels.heights[on], cloud.scale)
         before, rest = levels, z - columns @ fit.coefficients
@@ -116,20 +124,21 @@ def _by_pairs(design: Design, kind: str, cloud: Cloud, one: IntArray, other: Int
         if np.array_equal(before.level, levels.level):
             break
     if len(levels.heights) < 2:
-        return None
+        return None, held
     on = np.maximum(levels.level, 0)
     lowered = replace(cloud, points=np.column_stack([x, y, z - levels.heights[on]]))
     flat = height_field(design, kind, lowered)
     # along the field's normal in the middle, not along the axis of a cloud that the step itself tilts
     slope = np.asarray(flat.parameters["coefficients"], dtype=np.float64)[1:3]
     heights = levels.heights / np.sqrt(1.0 + slope @ slope)
-    return replace(
+    terraces = replace(
         flat,
         parameters=flat.parameters | {"levels": heights.tolist()},
         freedom=flat.freedom + levels.freedom,
         # rows that each stand on a level of their own may be those of any body
         explains=levels.edges >= len(levels.heights) - 1,
     )
+    return terraces, held
 
 
 def _pairs(cloud: Cloud, apart: float) -> tuple[IntArray, IntArray] | None:
