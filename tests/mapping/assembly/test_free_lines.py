@@ -255,3 +255,17 @@ def test_a_ring_hardly_wider_than_it_is_felt_is_a_closed_ridge_under_rows_one_wa
     (told,) = assembled(ring, 0.64e-3 * np.arange(-8, 9))
     assert told.kind == "ridge" and told.closed
     assert told.height.low < 0.2e-3 < told.height.high
+
+
+def test_what_rows_begin_and_end_on_is_no_feature() -> None:
+    """A plate's rim: each row rolls off it at both of its ends, which was told as two grooves, 1.1 and 0.85 mm wide."""
+    rng, tip, rim = np.random.default_rng(4), 1e-3, 0.25e-3
+    x, y = np.arange(-5e-3, 5e-3, 5e-5), np.arange(0.0, 6e-3, 0.8e-3)
+    u, v = (grid.ravel() for grid in np.meshgrid(x, y))
+    off = np.maximum(np.abs(u) - (5e-3 - rim), 0.0)
+    z = np.sqrt(tip**2 - off**2) + rng.normal(0.0, 1e-6, len(u))
+    raster = Trace(1e-3 * np.arange(len(u)), np.column_stack([u, v, z]), np.repeat(np.arange(len(y)), len(x)), tip)
+    base = fit_base(raster)
+    detections = detect(raster, base)
+    assert len(detections.crossings) >= 2 * len(y) - 2
+    assert assemble(detections, raster, base) == ()
