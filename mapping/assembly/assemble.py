@@ -35,9 +35,12 @@ from mapping.geometry.templates import SHAPE_ERROR
 from mapping.inference.configuration import (
     NEIGHBOURHOOD_REACH,
     PROPOSALS,
+    Configuration,
     Places,
     Proposal,
     accounted,
+    as_round,
+    explains,
     is_two,
 )
 from mapping.inference.families import Surroundings
@@ -88,7 +91,7 @@ def assemble(
         return _of_profile(detections, laid)
     inspections = inspections or inspected_for(detections, laid, base, spacing=spacing, faint=faint)
     spacing = place_spacing(crossings, trace.tip_radius) if spacing is None and crossings else spacing
-    wide, flat, round_it = list[Feature](), list[Feature](), list[Feature]()
+    wide, flat, round_it, spots = list[Feature](), list[Feature](), list[Feature](), list[Feature]()
     around = Surroundings(laid, base, detections.noise.rounded(laid.resolution))
     if spacing is not None and crossings:
         plain = Around(inspections.at(spacing), base, detections, trace.tip_radius)
@@ -102,6 +105,14 @@ def assemble(
         wide, slanted = free_lines(sections, detections, laid)
         # several sections may hold what stands off all of them
         looked = None if spacing is None else inspections.at(spacing)
+        if wide and looked is not None and proposals:
+            fits = [as_round(spot, _places(looked), around, false_alarms_per_metre) for spot in wide]
+            spots = [each[0] for each in fits if each is not None]
+            felt = [each[1] for each in fits if each is not None]
+            if felt:  # what a spot leaves on the rows at its foot is no detail of theirs
+                sections = [each for each in sections if not any(_left_by(best, each.crossing) for best in felt)]
+                rest, upon = ([c for c in own if not any(_left_by(best, c) for best in felt)] for own in (rest, upon))
+                wide, slanted = free_lines(sections, detections, laid)
         stepped = [] if looked is None else [c for c in crossings if c.is_step and between_levels(c, looked)]
         held = [crossing for section in slanted for crossing in section.inside]
         fine = {id(c): c for c in [*rest, *upon, *held, *stepped]}
@@ -119,7 +130,7 @@ def assemble(
                 wide = [feature for feature, out in zip(wide, lost, strict=True) if not out]
                 crossings = _off_lines(detections.crossings, wide, stepped, looked)
         detections = replace(detections, crossings=crossings)
-    features = flat if spacing is None else [*flat, *_linked(detections, laid, inspections.at(spacing))]
+    features = flat if spacing is None else [*flat, *spots, *_linked(detections, laid, inspections.at(spacing))]
     if features and spacing is not None and proposals:
         places = _places(inspections.at(spacing))
         alone = [feature for feature in wide if len(feature.axis) == 1 and feature.evidence.crossings == 1]
@@ -132,6 +143,10 @@ def assemble(
     if faint:
         features = with_faint_lines(features, detections, laid, base, false_alarms_per_metre, inspections)
     return _strongest_first([*wide, *round_it, *features])
+
+
+def _left_by(best: Configuration, crossing: Crossing) -> bool:
+    return explains(best, crossing.point, crossing.height)
 
 
 def _off_lines(
