@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mapping import Feature, MappingError, Posterior, Support
+from mapping import Feature, FloatArray, MappingError, Posterior, Support
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference import describe
@@ -138,7 +138,7 @@ def accounted(
             if block.laid is None:
                 continue
             improved, best = _improved(block, *block.laid, around, proposals)
-            left = [spot for spot in left if not _explains(best, spot)]
+            left = [spot for spot in left if not explains(best, spot.axis[0], spot.height.median)]
             noted = again and block.cut
             block.features = [_noted(feature, (IN_BLOCKS,)) for feature in improved] if noted else improved
             block.explained, block.changed = best.fits, best is not block.laid[1]
@@ -327,11 +327,9 @@ def _pays_beside_misfit(best: Configuration, start: Configuration) -> bool:
     return 0.5 * looks * float(np.log(before / left)) - 0.5 * more * float(np.log(looks)) + prior > 0.0
 
 
-def _explains(best: Configuration, spot: Feature) -> bool:
-    """True if a configuration leaves nothing over, and most of a spot where that lies."""
-    away = np.linalg.norm(best.place.window.feet - spot.axis[0], axis=1)
-    near = away < best.place.half_width
-    height = spot.height.median
+def explains(best: Configuration, point: FloatArray, height: float) -> bool:
+    """True if a configuration leaves nothing over, and most of a height (m) where that lies, about a point (3,)."""
+    near = np.linalg.norm(best.place.window.feet - point, axis=1) < best.place.half_width
     return bool(near.any() and best.fits and (best.template[near] / height).max() > MOST_OF_A_SPOT)
 
 
