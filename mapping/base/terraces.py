@@ -23,11 +23,12 @@ from mapping.base.quadrics import (
 )
 from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit, robust_scale
 
-# Cells whose heights are compared lie one of these shares of the cloud's extent apart: each is asked for the slope, and
-# the likeliest field stands. Of a staircase of n edges, n eighths of the pairs an eighth apart stand on two levels: the
-# sum of absolute residuals finds the slope as long as these are less than half, that is up to three edges one way.
-# Nearer pairs tell less of it, but beside as many edges as there may be levels; and edges that come again as often as
-# the cells lie apart make another slope of it, on which the teeth seem to scatter about one level
+# Cells whose heights are compared lie the first of these shares of the cloud's extent apart that tells the slope: by it
+# several levels are found, or one that holds most cells. Of a staircase of n edges, n eighths of the pairs an eighth
+# apart stand on two levels: the sum of absolute residuals finds the slope as long as these are less than half, that is
+# up to three edges one way. Nearer pairs tell less of it, but beside as many edges as there may be levels. Edges that
+# come again as often as the cells lie apart make another slope of it: no level holds most cells then, about any they
+# lie farther off than those of pairs scatter
 PAIRS_APART = (1 / 8, 1 / 16, 1 / 32, 1 / 64)
 # Of all cells so many must have a partner. Where lines are so far apart that it must be half the extent away, or all of
 # it between two, half of the cells can have one at most; a fifth of these may lie off the path
@@ -88,18 +89,14 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
     beyond the pairs' distance), and as many count as are independent then: roughness and drift are no levels, however
     smooth from cell to cell.
     """
-    best: Fitted | None = None
-    price = float(np.log(len(cloud.points)))  # of one parameter: by less none is likelier, and near pairs tell less
     for apart in PAIRS_APART:
         pairs = _pairs(cloud, apart)
         if pairs is None:
-            break
+            return None
         fit, held = _by_pairs(design, kind, cloud, *pairs)
-        if fit is None and held > 0.5:
-            break
-        if fit is not None and (best is None or fit.cost(cloud.scale) < best.cost(cloud.scale) - price):
-            best = fit
-    return best
+        if fit is not None or held > 0.5:
+            return fit
+    return None
 
 
 def _by_pairs(design: Design, kind: str, cloud: Cloud, one: IntArray, other: IntArray) -> tuple[Fitted | None, float]:
