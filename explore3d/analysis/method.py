@@ -30,6 +30,7 @@ from mapping.assembly import (
     along_sweeps,
     assemble,
     felt_alone,
+    half_felt,
     inspected_for,
     why_none_sought,
     without_wide,
@@ -713,7 +714,8 @@ def believed(work: Work, share: Share) -> None:
         ]
     )
     work.features = (*work.features, *alone)
-    lone = dropped_crossings(work.detections.crossings, work.features, work.trace.tip_radius)
+    cut = () if work.inspections is None else half_felt(work.detections, work.laid, work.inspections)
+    lone = dropped_crossings(work.detections.crossings, work.features, work.trace.tip_radius, cut)
     work.dropped = (*unlikely, *lone)
     for each in unlikely:
         at = place_text(each.point, work.trace.tip_radius)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class Camera:
         height = min(self.height - self.height % 8, 8 * int(np.ceil(2 * margin * float(rows.max()) / 8)))
         return replace(self, height=height, field=2 * float(np.arctan(0.5 * height * self.pixel)))
 
-    @property
+    @cached_property
     def frame(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Unit vectors to the right, up, and forward."""
         forward = (self.target - self.eye) / np.linalg.norm(self.target - self.eye)

@@ -62,8 +62,7 @@ class Obstacles:
         self._refuse(f"{what}: the stem", stem, np.repeat(centers, count, axis=0), self.stem_radius)
 
     def _refuse(self, what: str, points: FloatArray, centers: FloatArray, radius: float) -> None:
-        depth = radius - self.nearest.query(points).distance
-        hit = depth > YIELDS * self.tip_radius
+        hit = self.nearest.nearer_than(points, radius - YIELDS * self.tip_radius)
         if hit.any():
             center = centers[hit.argmax()]
             where = place_text(center, self.tip_radius)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     )
     from mapping.assembly.assemble import (
         assemble as assemble,
+        half_felt as half_felt,
         inspected_for as inspected_for,
         place_spacing as place_spacing,
     )
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "along_sweeps": ("RUNS_ALONG", "AlongSweeps", "along_sweeps"),
-    "assemble": ("assemble", "inspected_for", "place_spacing"),
+    "assemble": ("assemble", "half_felt", "inspected_for", "place_spacing"),
     "faint_features": ("why_none_sought", "with_faint_lines"),
     "faint_lines": ("load_faint_kernel",),
     "free.felt_alone": ("felt_alone",),

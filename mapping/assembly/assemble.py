@@ -11,8 +11,17 @@ from mapping import Feature, FloatArray, Trace
 from mapping.assembly.details import along_rested, details_of, made_of
 from mapping.assembly.edges import between_levels, edge_features, step_features
 from mapping.assembly.faint_features import faint_spacing, why_none_sought, with_faint_lines
-from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
-from mapping.assembly.free import free_sections, free_spot, outweighed, round_lines
+from mapping.assembly.false_crossings import (
+    PLACES_OF_HALF,
+    comes_down,
+    cut_off,
+    is_cut,
+    is_open,
+    is_plateau_end,
+    is_unseen,
+    on_a_step,
+)
+from mapping.assembly.free import free_sections, free_spot, outweighed, round_lines, uncrossed
 from mapping.assembly.free_lines import free_lines, lies_on
 from mapping.assembly.lines import Around
 from mapping.assembly.linking import Inspection, Inspections, groups
@@ -23,7 +32,17 @@ from mapping.base import Base, LaidTrace
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import SHAPE_ERROR
-from mapping.inference.configuration import NEIGHBOURHOOD_REACH, PROPOSALS, Places, Proposal, accounted, is_two
+from mapping.inference.configuration import (
+    NEIGHBOURHOOD_REACH,
+    PROPOSALS,
+    Configuration,
+    Places,
+    Proposal,
+    accounted,
+    as_round,
+    explains,
+    is_two,
+)
 from mapping.inference.families import Surroundings
 from mapping.inference.kinds import kind_made_of, kind_of
 
@@ -72,7 +91,7 @@ def assemble(
         return _of_profile(detections, laid)
     inspections = inspections or inspected_for(detections, laid, base, spacing=spacing, faint=faint)
     spacing = place_spacing(crossings, trace.tip_radius) if spacing is None and crossings else spacing
-    wide, flat, round_it = list[Feature](), list[Feature](), list[Feature]()
+    wide, flat, round_it, spots = list[Feature](), list[Feature](), list[Feature](), list[Feature]()
     around = Surroundings(laid, base, detections.noise.rounded(laid.resolution))
     if spacing is not None and crossings:
         plain = Around(inspections.at(spacing), base, detections, trace.tip_radius)
@@ -86,6 +105,14 @@ def assemble(
         wide, slanted = free_lines(sections, detections, laid)
         # several sections may hold what stands off all of them
         looked = None if spacing is None else inspections.at(spacing)
+        if wide and looked is not None and proposals:
+            fits = [as_round(spot, _places(looked), around, false_alarms_per_metre) for spot in wide]
+            spots = [each[0] for each in fits if each is not None]
+            felt = [each[1] for each in fits if each is not None]
+            if felt:  # what a spot leaves on the rows at its foot is no detail of theirs
+                sections = [each for each in sections if not any(_left_by(best, each.crossing) for best in felt)]
+                rest, upon = ([c for c in own if not any(_left_by(best, c) for best in felt)] for own in (rest, upon))
+                wide, slanted = free_lines(sections, detections, laid)
         stepped = [] if looked is None else [c for c in crossings if c.is_step and between_levels(c, looked)]
         held = [crossing for section in slanted for crossing in section.inside]
         fine = {id(c): c for c in [*rest, *upon, *held, *stepped]}
@@ -103,17 +130,23 @@ def assemble(
                 wide = [feature for feature, out in zip(wide, lost, strict=True) if not out]
                 crossings = _off_lines(detections.crossings, wide, stepped, looked)
         detections = replace(detections, crossings=crossings)
-    features = flat if spacing is None else [*flat, *_linked(detections, laid, inspections.at(spacing))]
+    features = flat if spacing is None else [*flat, *spots, *_linked(detections, laid, inspections.at(spacing))]
     if features and spacing is not None and proposals:
         places = _places(inspections.at(spacing))
         alone = [feature for feature in wide if len(feature.axis) == 1 and feature.evidence.crossings == 1]
+        beyond = set(map(id, cut_off(crossings, inspections.at(spacing).over_terraces)))
+        told = [c for c in crossings if id(c) not in beyond]
         features, left = accounted(
-            features, crossings, places, around, false_alarms_per_metre, proposals, alone, measured=wide
+            features, told, places, around, false_alarms_per_metre, proposals, alone, measured=wide
         )
         wide = [feature for feature in wide if feature not in alone or feature in left]
     if faint:
         features = with_faint_lines(features, detections, laid, base, false_alarms_per_metre, inspections)
-    return _strongest_first([*wide, *round_it, *features])
+    return _strongest_first([*wide, *uncrossed(round_it, features, laid.tip_radius), *features])
+
+
+def _left_by(best: Configuration, crossing: Crossing) -> bool:
+    return explains(best, crossing.point, crossing.height)
 
 
 def _off_lines(
@@ -140,6 +173,19 @@ def inspected_for(
     return Inspections.of(laid, base, detections.noise, needed)
 
 
+def half_felt(detections: Detections, laid: LaidTrace, inspections: Inspections) -> Sequence[Crossing]:
+    """The crossings that `assemble` makes no feature of, for their sweeps began or ended before they had passed them.
+
+    Args:
+        detections, laid, inspections: as `assemble` got them.
+    """
+    if _is_profile(laid) or not detections.crossings:
+        return ()
+    return cut_off(
+        detections.crossings, inspections.at(place_spacing(detections.crossings, laid.tip_radius)).over_terraces
+    )
+
+
 def _places(inspection: Inspection) -> Places:
     """The heights that configurations are weighed on."""
     return Places(
@@ -155,7 +201,7 @@ def _is_profile(laid: LaidTrace) -> bool:
 
 def place_spacing(crossings: Sequence[Crossing], tip_radius: float) -> float:
     """Distance between inspected places of a sweep, m: five to a half-width of a sharp crest of the typical height."""
-    return 0.2 * _scale(crossings, tip_radius)
+    return _scale(crossings, tip_radius) / PLACES_OF_HALF
 
 
 def _linked(detections: Detections, trace: LaidTrace, inspection: Inspection) -> list[Feature]:
@@ -208,12 +254,15 @@ def _on_crest(places: Sequence[Crossing], around: Around) -> list[Crossing]:
 def _grouped(
     crests: list[Crossing], inspection: Inspection, scale: float
 ) -> tuple[list[list[Crossing]], list[list[Crossing]]]:
-    """Groups of linked crests of one sign: those that a sweep came down from on both sides, and the others."""
+    """Groups of linked crests of one sign: those that a sweep came down from on both sides, and the others; none of
+    what no sweep passed."""
     certain: list[list[Crossing]] = []
     doubtful: list[list[Crossing]] = []
     for kind in ("convex", "concave"):
         alike = [c for c in crests if c.kind == kind]
         for members in groups(alike, inspection, scale) if alike else []:
+            if all(is_cut(alike[i], inspection) for i in members):
+                continue
             for group in _without_strays([alike[i] for i in members], scale):
                 top = max(abs(c.height) for c in group)
                 high = [c for c in group if abs(c.height) > 0.5 * top]

@@ -1,8 +1,8 @@
-"""Crossings that are none: three ways in which one sweep misleads.
+"""Crossings that are none: four ways in which one sweep misleads.
 
 Unseen: it claims to be clear, but the mean heights of its own sweep do not show it. Plateau end: the sweep came down
 from a crest to the base, taken for a hollow in the crest's level. Open crest: the sweep began or ended in the
-disturbance, which may as well be a step seen from above.
+disturbance, which may as well be a step seen from above. Cut off: it began or ended before the extreme.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapping import Feature, lengths
-from mapping.assembly.linking import Inspection, uphill
+from mapping.assembly.linking import Inspection, groups, uphill
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import crest_trace
@@ -67,6 +67,10 @@ def is_plateau_end(crossing: Crossing, inspection: Inspection) -> bool:
 
 # Share of the crest at which a sweep that ends so high is still up.
 STILL_UP = 0.25
+# Places of a sweep whose heights are looked at, to a half-width of a sharp crest of the typical height
+PLACES_OF_HALF = 5.0
+# A crest is that of what was felt if it is half as high there, at least: half-way between it and nothing.
+OUTERMOST = 0.5
 # What is higher than this many heights of a step is more than the step.
 HIGHER = 1.3
 
@@ -85,6 +89,40 @@ def is_open(crossing: Crossing, inspection: Inspection) -> bool:
         side > up and bool((part > 0.5 * up).all())
         for side, part in zip(sides, (heights[: nearest + 1], heights[nearest:]), strict=True)
     )
+
+
+def cut_off(crossings: Sequence[Crossing], inspection: Inspection) -> list[Crossing]:
+    """Crests and hollows of which only one flank was felt, by all sweeps that they are linked with: the rim of a plate
+    that the rows begin on, a ridge or a step leave the same trace, and nothing tells how high what is beyond goes.
+
+    Args:
+        crossings: all that was detected.
+        inspection: heights over the base's own levels, PLACES_OF_HALF to a half-width of theirs.
+    """
+    crests = [c for c in crossings if not c.is_step]
+    cut = {id(c) for c in crests if is_cut(c, inspection)}
+    found: list[Crossing] = []
+    for sign in (1.0, -1.0) if cut else ():
+        alike = [c for c in crests if c.height * sign > 0.0]
+        for members in groups(alike, inspection, PLACES_OF_HALF * inspection.spacing) if alike else []:
+            group = [alike[k] for k in members]
+            found += group if all(id(c) in cut for c in group) else []
+    return found
+
+
+def is_cut(crossing: Crossing, inspection: Inspection) -> bool:
+    """True if a sweep had not passed the extreme when it began or ended: its outermost place is as far off as any up to
+    the crossing, but for noise."""
+    own = inspection.of_sweep(crossing.sweep)
+    gap = lengths(inspection.points[own] - crossing.point)
+    nearest = int(gap.argmin())
+    heights, sd = np.sign(crossing.height) * inspection.height[own], inspection.sd[own]
+    for side in (slice(0, nearest + 1), slice(len(own) - 1, nearest - 1 if nearest else None, -1)):
+        way, far = heights[side], gap[side]
+        doubt = 3.0 * float(np.hypot(sd[side][0], sd[side][way.argmax()]))
+        if far[0] < crossing.half_width and way[0] > OUTERMOST * abs(crossing.height) and way.max() - way[0] < doubt:
+            return True
+    return False
 
 
 def comes_down(edge: Crossing, inspection: Inspection) -> bool:

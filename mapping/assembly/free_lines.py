@@ -54,13 +54,18 @@ def free_lines(
             inspection = Inspections.of(trace, trace.base, detections.noise, [spacing]).at(spacing)
             linked = groups([section.crossing for section in alike], inspection, core)
             own = list[Feature]()
-            for members in sorted(linked, key=len, reverse=True):  # what ends a line is found with it
+            # what ends a line is found with it, and what is felt at the foot of a spot with that
+            for members in sorted(linked, key=lambda own: (len(own), _height_of(own, alike)), reverse=True):
                 group = [alike[k] for k in members]
                 if not any(_is_of(section, line) for line in own for section in group):
                     lines, not_wide = _of_group(group, inspection, detections, trace)
                     own, slanted = [*own, *lines], [*slanted, *not_wide]
             found += own
     return found, slanted
+
+
+def _height_of(members: Sequence[int], sections: Sequence[FreeSection]) -> float:
+    return max(sections[k].sizes.height for k in members)
 
 
 def _is_of(section: FreeSection, feature: Feature) -> bool:

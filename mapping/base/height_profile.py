@@ -221,18 +221,10 @@ def _at_middles(means: FloatArray, occupied: IntArray, place: FloatArray) -> Flo
         occupied: (n,) their numbers, ascending.
         place: (n,) numbers of bins at whose middles these means are.
     """
-    moved, inner = means.copy(), 1 + np.flatnonzero(occupied[2:] - occupied[:-2] == 2)
+    from mapping.instrument import at_middles
 
-    def spread(values: FloatArray) -> FloatArray:
-        return np.asarray(values.reshape(-1, *(1,) * (means.ndim - 1)))
-
-    behind = (means[inner] - means[inner - 1]) / spread(place[inner] - place[inner - 1])
-    ahead = (means[inner + 1] - means[inner]) / spread(place[inner + 1] - place[inner])
-    across = (means[inner + 1] - means[inner - 1]) / spread(place[inner + 1] - place[inner - 1])
-    steepest = np.where(behind * ahead > 0.0, 2.0 * np.minimum(np.abs(behind), np.abs(ahead)), 0.0)
-    slope = np.clip(across, -steepest, steepest)
-    moved[inner] += spread(occupied[inner] - place[inner]) * slope
-    return moved
+    rows = np.ascontiguousarray(means).reshape(len(means), -1)
+    return np.asarray(at_middles(rows, occupied, place)).reshape(means.shape)
 
 
 def _laid_on(base: Base, tip_radius: float) -> Means:

@@ -73,7 +73,7 @@ class LaidSweep:
             laid = self.base.foot(self.trace.centers[new], self.trace.tip_radius)
             self._feet = _joined([self._feet, laid]) if count else laid
             self._row[new] = np.arange(count, count + len(new))
-        return _rows(self._feet, self._row[index])
+        return _rows(self._feet, _run_of(self._row[index]))
 
     @property
     def _all_laid(self) -> bool:
@@ -103,7 +103,7 @@ class LaidSweep:
             rows, counts = rows[samples - first[0]], counts[known]
         if known.any():
             starts = np.cumsum([0, *counts[:-1]])
-            kept = _rows(self._feet, rows)
+            kept = _rows(self._feet, _run_of(rows))
             up = np.repeat(kept.normals[starts], counts, axis=0)
             turn = np.abs(kept.normals - up).max(axis=1)
             apart = kept.points - np.repeat(kept.points[starts], counts, axis=0)
@@ -301,6 +301,13 @@ def _empty(count: int) -> Feet:
         np.zeros(count, dtype=np.int64),
         np.zeros((count, 3)),
     )
+
+
+def _run_of(rows: NDArray[np.int32]) -> NDArray[np.int32] | slice:
+    """Rows (M,), as a slice where they follow one another: of all that were laid at once nothing is copied."""
+    if len(rows) and rows[-1] - rows[0] == len(rows) - 1 and (np.diff(rows) == 1).all():
+        return slice(int(rows[0]), int(rows[-1]) + 1)
+    return rows
 
 
 def _rows(feet: Feet, rows: NDArray[np.int32] | IntArray | slice) -> Feet:

@@ -26,16 +26,18 @@ from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit, robust_scale
 # Cells whose heights are compared lie the first of these shares of the cloud's extent apart that tells the slope: by it
 # several levels are found, or one that holds most cells. Of a staircase of n edges, n eighths of the pairs an eighth
 # apart stand on two levels: the sum of absolute residuals finds the slope as long as these are less than half, that is
-# up to three edges one way. Nearer pairs tell less of it, but beside as many edges as there may be levels
-PAIRS_APART = (1 / 8, 1 / 16, 1 / 32)
+# up to three edges one way. Nearer pairs tell less of it, but beside as many edges as there may be levels. Edges that
+# come again as often as the cells lie apart make another slope of it: no level holds most cells then, about any they
+# lie farther off than those of pairs scatter
+PAIRS_APART = (1 / 8, 1 / 16, 1 / 32, 1 / 64)
 # Of all cells so many must have a partner. Where lines are so far apart that it must be half the extent away, or all of
 # it between two, half of the cells can have one at most; a fifth of these may lie off the path
 FEWEST_PAIRS = 0.4
 # Of a run's samples, the share that is its end: the detail itself lies in the middle, and a median minds nothing that
 # reaches into less than half of an end
 END_SHARE = 8
-# More levels than that have no two cells an eighth of the extent from each other on one of them
-MOST_LEVELS = 8
+# More levels than that have no two cells of the nearest pairs on one of them
+MOST_LEVELS = round(1 / PAIRS_APART[-1])
 # Mean square, in standard deviations, up to which what lies about a height (FEATURE_RESIDUAL_SDS to either side) is as
 # likely to scatter about it as to lie anywhere there: 2 log(2 FEATURE_RESIDUAL_SDS / sqrt(2 pi)). Of a level it is 1,
 # of a crest or a flank that passes through the height 3 and more
@@ -80,9 +82,9 @@ def terraced_quadric(cloud: Cloud) -> Fitted | None:
 def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
     """A height field z = design(x, y) @ coefficients + one of a few levels, or None where one level is enough.
 
-    The field's slopes come from differences of heights of cells that lie apart, of which most stand on one level. A
-    level counts if the cells on it gain more than its height and the places of its edges cost. The field of the level
-    with the most cells is the base; the others are what detection finds as steps.
+    The field's slopes come from differences of heights of cells that lie apart (`PAIRS_APART`), of which most stand on
+    one level. A level counts if the cells on it gain more than its height and the places of its edges cost. The field
+    of the level with the most cells is the base; the others are what detection finds as steps.
     Cells on a level may differ by what the cells of such pairs do, or by more where a level holds more (drift goes on
     beyond the pairs' distance), and as many count as are independent then: roughness and drift are no levels, however
     smooth from cell to cell.
@@ -99,7 +101,7 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
 
 def _by_pairs(design: Design, kind: str, cloud: Cloud, one: IntArray, other: IntArray) -> tuple[Fitted | None, float]:
     """The field whose slopes are those between cells (P,) and others (P,), None where one level is enough, and the
-    share of all cells that its fullest level holds to begin with."""
+    share of all cells that its fullest level holds to begin with, no farther off it than the cells of pairs scatter."""
     x, y, z = cloud.points.T
     columns = design(x, y)
     # what differences cannot tell, the constant, comes out as zero: the levels hold it
@@ -107,7 +109,8 @@ def _by_pairs(design: Design, kind: str, cloud: Cloud, one: IntArray, other: Int
     rest = z - columns @ slopes
     paired = max(cloud.scale, robust_scale(rest[one] - rest[other]) / np.sqrt(2.0))
     levels = _levels(rest, cloud, paired)
-    held = float(np.mean(levels.level == 0))
+    reach = FEATURE_RESIDUAL_SDS * paired
+    held = float(np.mean(np.abs(rest - _densest(np.sort(rest), reach)) < reach))
     for _ in range(LEVEL_ROUNDS):
         if len(levels.heights) < 2:
             return None, held

@@ -262,17 +262,11 @@ def _stretches(
 
 def _certainties(profile: SweepHeights, bank: Bank, null: NullScale | None) -> FloatArray | None:
     """(F, n) expected over actual sd of what each filter that fits sees in each bin; None where it is 1 throughout."""
-    sampled = sampling(profile, bank) if null is None else None
-    if sampled is None and null is None:
-        return None
-    out = np.ones((len(bank.filters), len(profile.height)))
     count = bank.fitting(len(profile.height), _longest(profile.height, bank))
     if null is not None:
-        for k in range(count):
-            out[k] /= null.along(k)
-    elif sampled is not None:
-        out[:count] /= seen_by_each(sampled, bank.widths[:count] / bank.spacing)
-    return out
+        return 1.0 / np.reshape([null.along(k) for k in range(count)], (count, len(profile.height)))
+    sampled = sampling(profile, bank)
+    return None if sampled is None else 1.0 / seen_by_each(sampled, bank.widths[:count] / bank.spacing)
 
 
 def _longest(height: FloatArray, bank: Bank) -> float:

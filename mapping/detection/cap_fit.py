@@ -10,13 +10,15 @@ from mapping import FloatArray
 from mapping.base import SweepHeights
 from mapping.detection.outliers import LEANT
 from mapping.geometry.templates import rim_height, step_height
-from mapping.instrument import Noise
+from mapping.instrument import Filter, Noise
 
 # Improvement in twice the log-likelihood that a plateau must bring over a cap.
 PLATEAU_GAIN = 12.0
 # Averaging a stretch to this many bins costs its fit less than 1 % of its information.
 CAP_FIT_BINS = 120
 ZOOM_ROUNDS = 5
+# Points of a refined grid about the best one, in steps of the grid before
+AROUND = np.linspace(-1.0, 1.0, 9)
 # Shares of a plateau's half-width that its flanks may take, and how often the best share is refined.
 FLANKS = (0.4, 0.02)
 FLANK_ROUNDS = 4
@@ -49,37 +51,38 @@ CUSP = 2.08
 
 @dataclass(frozen=True, eq=False)
 class _Whitened:
-    """A window of a profile seen through the inverse square root of its noise.
+    """A window of a profile as its noise lets it be seen.
 
     Args:
         x: (n,) arclengths of the bins' middles, m, from the profile's first bin.
         step: width of the bins, m.
-        root: (n, n) whitening matrix, with the drift projected out.
-        values: (n,) whitened heights.
-        triangular: True where nothing was projected out: the root is then zero above its diagonal.
+        filter: whitens what the bins hold.
+        basis: (n, drift) whitened orthonormal columns of the drift, which is not seen.
+        values: (n,) whitened heights without drift.
     """
 
     x: FloatArray
     step: float
-    root: FloatArray
+    filter: Filter
+    basis: FloatArray
     values: FloatArray
-    triangular: bool
+
+    def whitened(self, heights: FloatArray) -> FloatArray:
+        """What is seen of heights (n,) of the bins, m."""
+        seen = self.filter.whiten(heights[None])[0]
+        return np.asarray(seen - self.basis @ (self.basis.T @ seen))
 
     def gains(
         self, place: FloatArray, half_width: FloatArray, flat: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Gain in twice the log-likelihood, height and its information for caps (C,), by least squares."""
-        from scipy.linalg.blas import dtrmm
+        from mapping.detection.filters import cap_products
 
-        from mapping.detection.filters import caps
-
-        shapes = caps(self.x[0], self.step, len(self.x), place, half_width, flat * half_width)
-        if self.triangular:  # half of the products are by zero
-            seen = dtrmm(1.0, self.root.T, shapes.T, lower=0, trans_a=1, overwrite_b=1).T
-        else:
-            seen = shapes @ self.root.T
-        information = np.maximum(np.einsum("ij,ij->i", seen, seen), np.finfo(float).tiny)
-        height = seen @ self.values / information
+        steps, gain, scale = self.filter.steps, self.filter.gain, self.filter.scale
+        of_bins, of_noise = (self.values, self.basis), (steps.observe, steps.carry, steps.turn, gain, scale)
+        found = cap_products(self.x[0], self.step, place, half_width, flat * half_width, *of_bins, *of_noise)
+        information = np.maximum(found[:, 0], np.finfo(float).tiny)
+        height = found[:, 1] / information
         return height * np.abs(height) * information, height, information
 
 
@@ -112,7 +115,7 @@ def fit_cap(
     # of the arc about an edge; up a wall the ball goes straight, r before it
     up = min(float(np.abs(height[low:high]).max()), tip_radius)
     sharpest = float(np.sqrt(up * (2.0 * tip_radius - up)))
-    crest = _zoom(window, sign, low * spacing, (high - 1) * spacing, half, 0.0)
+    crest = _zoom(window, sign, low * spacing, (high - 1) * spacing, half, np.zeros(1))
     # half of an arc between both edges, or they are one crest: by the window, which is wider, and by the fit
     widest = 1.5 * sharpest
     if half > widest and not any(neighbours):
@@ -164,7 +167,7 @@ def _drawn_gain(window: _Whitened, place: float, found: Disturbance, tip_radius:
         inside = max(rest, 0.0) - np.abs(x - middle)
         up = found.height > 0
         drawn = step_height(inside, max(high, 0.0), radius) if up else rim_height(inside, radius, max(high, 0.0))
-        seen = window.root @ drawn.mean(axis=1)
+        seen = window.whitened(drawn.mean(axis=1))
         return float(seen @ seen - 2.0 * seen @ window.values)
 
     scale = np.array([found.half_width, found.half_width, height, tip_radius])
@@ -214,48 +217,53 @@ def _whitened(
     x = (begin + (np.arange(count, dtype=np.float64) + 0.5) * merge - 0.5) * profile.spacing
     values = height[begin : begin + count * merge].reshape(count, merge).mean(axis=1)
     step = merge * profile.spacing
-    covariances = noise.block_covariances(count, step, profile.samples * merge)
-    lags = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    cholesky = np.linalg.cholesky(covariances[lags] + 1e-12 * covariances[0] * np.eye(count))
-    root = np.linalg.inv(cholesky)
+    filter_ = noise.block_filter(count, step, profile.samples * merge)
+    basis = np.zeros((count, 0))
     if drift:
-        nuisance = ((x - x.mean()) / max(float(np.ptp(x)), step))[:, None] ** np.arange(drift)
-        basis = np.linalg.qr(root @ nuisance)[0]
-        root = root - basis @ (basis.T @ root)
-    return _Whitened(x, step, root, root @ values, not drift)
+        nuisance = ((x - x.mean()) / max(float(np.ptp(x)), step)) ** np.arange(drift)[:, None]
+        basis = np.linalg.qr(filter_.whiten(nuisance).T)[0]
+    window = _Whitened(x, step, filter_, basis, values)
+    return replace(window, values=window.whitened(values))
 
 
 def _plateau(window: _Whitened, sign: float, low: float, high: float, half: float) -> tuple[float, float, float, float]:
     """(gain, place, half-width, flatness) of the best plateau: its flanks may be a small share of its width."""
-    flats = list(1.0 - np.geomspace(*FLANKS, 6))
-    best = max(_zoom(window, sign, low, high, half, flat) for flat in flats)
+    best = _zoom(window, sign, low, high, half, 1.0 - np.geomspace(*FLANKS, 6))
     factor = (FLANKS[1] / FLANKS[0]) ** 0.1
     for _ in range(FLANK_ROUNDS):
-        near = [1.0 - (1.0 - best[3]) * f for f in (1 / factor, factor)]
-        best = max(best, *(_zoom(window, sign, low, high, half, flat) for flat in near))
+        near = 1.0 - (1.0 - best[3]) * np.array([1 / factor, factor])
+        best = max(best, _zoom(window, sign, low, high, half, near))
         factor = factor**0.5
     return best
 
 
 def _zoom(
-    window: _Whitened, sign: float, low: float, high: float, half: float, flat: float
+    window: _Whitened, sign: float, low: float, high: float, half: float, flats: FloatArray
 ) -> tuple[float, float, float, float]:
-    """(gain, place, half-width, flatness) of the best cap: a grid, refined around its best point."""
-    places = np.linspace(low, high, 17)
+    """(gain, place, half-width, flatness) of the best cap: a grid for each flatness (F,), refined around its best
+    point."""
+    each = np.arange(len(flats))
     narrowest = max(1.2 * window.step, half / 8)
-    widths = np.geomspace(narrowest, max(2.0 * half, 1.1 * narrowest), 13)
-    best = (-np.inf, 0.5 * (low + high), half, flat)
+    places = np.tile(np.linspace(low, high, 17), (len(flats), 1))
+    widths = np.tile(np.geomspace(narrowest, max(2.0 * half, 1.1 * narrowest), 13), (len(flats), 1))
+    best = np.tile([-np.inf, 0.5 * (low + high), half], (len(flats), 1))
     for _ in range(ZOOM_ROUNDS):
-        grid_place, grid_width = (g.ravel() for g in np.meshgrid(places, widths))
-        gains = sign * window.gains(grid_place, grid_width, np.full(len(grid_place), flat))[0]
-        k = int(gains.argmax())
-        if gains[k] > best[0]:
-            best = (float(gains[k]), float(grid_place[k]), float(grid_width[k]), flat)
-        reach = places[1] - places[0]
-        factor = widths[1] / widths[0]
-        places = np.clip(np.linspace(best[1] - reach, best[1] + reach, 9), low, high)
-        widths = np.maximum(best[2] * np.geomspace(1 / factor, factor, 9), narrowest)
-    return best
+        place, width, flat = (
+            np.ascontiguousarray(grid).ravel()
+            for grid in np.broadcast_arrays(places[:, None, :], widths[:, :, None], flats[:, None, None])
+        )
+        gains = (sign * window.gains(place, width, flat)[0]).reshape(len(flats), -1)
+        top = gains.argmax(axis=1)
+        found = np.column_stack(
+            [gains[each, top], places[each, top % places.shape[1]], widths[each, top // places.shape[1]]]
+        )
+        best = np.where(found[:, :1] > best[:, :1], found, best)
+        reach = (places[:, 1] - places[:, 0])[:, None] * AROUND
+        factor = (widths[:, 1] / widths[:, 0])[:, None] ** AROUND
+        places = np.clip(best[:, 1:2] + reach, low, high)
+        widths = np.maximum(best[:, 2:] * factor, narrowest)
+    k = int(best[:, 0].argmax())
+    return (*best[k].tolist(), float(flats[k]))
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -178,7 +179,8 @@ def background(
     level, fit, banks = first, NoiseFit(first), _banks(profiles, first, tip_radius, largest, drift)
     quiet: list[BoolArray] = []
 
-    def suspected() -> list[Suspects]:
+    @lru_cache(1)
+    def suspected(level: Noise) -> list[Suspects]:
         return [suspects(p, banks[p.spacing], level, SUSPECT, tip_radius) for p in profiles]
 
     def kept(found: Sequence[Suspects], cuts: dict[float, float]) -> list[BoolArray]:
@@ -191,7 +193,7 @@ def background(
         for turn in range(QUIET_NOISE_ROUNDS):
             before = quiet
             if turn or not several:
-                quiet = kept(suspected(), dict.fromkeys(banks, SUSPECT))
+                quiet = kept(suspected(level), dict.fromkeys(banks, SUSPECT))
                 if before and all(np.array_equal(a, b) for a, b in zip(quiet, before, strict=True)):
                     break
             one = fit if several and turn == 0 else None
@@ -204,7 +206,7 @@ def background(
     # many independent parts as samples, the cut takes a fifth of a per cent
     if base.known and level.terms and not level.further:
         for _ in range(QUIET_NOISE_ROUNDS):
-            found, before = suspected(), quiet
+            found, before = suspected(level), quiet
             quiet = kept(found, _cuts(profiles, found, banks))
             if all(np.array_equal(a, b) for a, b in zip(quiet, before, strict=True)):
                 break

@@ -190,7 +190,7 @@ def _runs(level: IntArray, on: BoolArray, shortest: float, passed: int) -> list[
 
     What is no longer than `shortest` is a detail of the level on both its sides, unless these are two: then it is a
     stair, if it is longer than what is `passed` on the way from one to the other. So is what a sweep begins or ends on,
-    of which there is no other side.
+    of which there is no other side. Where nothing is longer, as on the teeth of a saw, all are stairs, or none is.
     """
     at = np.flatnonzero(on)
     if not len(at):
@@ -204,6 +204,9 @@ def _runs(level: IntArray, on: BoolArray, shortest: float, passed: int) -> list[
             runs[-1] = (runs[-1][0], end, own)
         else:
             runs.append((begin, end, own))
+    if not runs:
+        steady = [piece for piece in pieces if piece[1] - piece[0] > passed]
+        return steady if all(one[2] != other[2] for one, other in zip(steady, steady[2:], strict=False)) else []
     stairs = [
         piece
         for (_, end, here), (onward, _, there) in itertools.pairwise(runs)

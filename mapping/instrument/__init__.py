@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         running_mean as running_mean,
         running_means as running_means,
     )
+    from mapping.instrument.averaging_kernels import at_middles as at_middles
     from mapping.instrument.block_likelihood import (
         Blocks as Blocks,
         NoiseFit as NoiseFit,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "averaging": ("Means", "RunMeans", "running_mean", "running_means"),
+    "averaging_kernels": ("at_middles",),
     "block_likelihood": ("Blocks", "NoiseFit", "perturbed", "relative_sd"),
     "core": ("core_of", "fit_on_densest", "span_of"),
     "levels": ("Levels",),

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from mapping import FloatArray, NoiseError
 from mapping.instrument.levels import Levels
 from mapping.instrument.robust import robust_sd
-from mapping.instrument.states import point_steps
+from mapping.instrument.states import Filter, mean_steps, point_steps
 from mapping.instrument.term import Term
 
 # Rounding of contact geometry, in tip radii, and of numbers, in the greatest of them: no noise is taken to be smaller
@@ -194,6 +194,11 @@ class Noise:
         covariances[0] = own
         return covariances
 
+    def block_filter(self, count: int, block: float, samples: float) -> Filter:
+        """What whitens means over adjoining blocks in O(count); the arguments as of `block_covariances`."""
+        steps = mean_steps(self.terms, np.array([block]), np.array([self.white**2 / samples]))
+        return steps.filter(np.zeros(count, dtype=np.int64), np.arange(count) == 0, np.ones(count, dtype=bool))
+
     def whiten(self, values: ArrayLike, s: ArrayLike) -> tuple[FloatArray, float]:
         """Values as seen by independent unit noise, in O(N).
 
@@ -258,6 +263,8 @@ def estimate_noise(residual: ArrayLike, s: ArrayLike) -> Noise:
 def _mean_variance(x: FloatArray) -> FloatArray:
     """Variance of the mean of a unit process over x = rate times length; series where the form cancels."""
     near = np.abs(x) < SERIES_LIMIT
+    if not near.any():
+        return np.asarray(2 * ((x + np.expm1(-x)) / x) / x)
     safe, close = np.where(near, SERIES_LIMIT, x), np.where(near, x, SERIES_LIMIT)
     series = np.polynomial.polynomial.polyval(close, 2.0 * SIGNS / FACTORIALS)
     return np.where(near, series, 2 * ((safe + np.expm1(-safe)) / safe) / safe)

@@ -11,6 +11,9 @@ from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference.kinds import feature_trace, kind_of, sizes_of
 
+NEITHER = "what was felt around it makes neither line nor spot of it"
+# What is said where no sweep passed the extreme
+ONE_FLANK = "sweeps begin or end on it, and what it is lies beyond what was felt"
 # Share of a height that is most of it
 MOST = 0.5
 
@@ -40,7 +43,7 @@ def _gap_to_crest(centers: FloatArray, feature: Feature, tip_radius: float) -> F
 
 
 def dropped_crossings(
-    crossings: Sequence[Crossing], features: Sequence[Feature], tip_radius: float
+    crossings: Sequence[Crossing], features: Sequence[Feature], tip_radius: float, cut: Sequence[Crossing] = ()
 ) -> tuple[Dropped, ...]:
     """Crossings that no feature accounts for: none lies within their disturbance, or within its own, or leaves most of
     what was felt there, as the flank of a bump that runs out does to the rows that pass beside it; nor did the ball
@@ -51,6 +54,7 @@ def dropped_crossings(
         crossings: all that was detected.
         features: all that was made of them, likely or not.
         tip_radius: radius of the fingertip, m.
+        cut: those whose sweeps began or ended before they had passed it.
     """
     if not crossings:
         return ()
@@ -93,7 +97,7 @@ def dropped_crossings(
             float(np.sqrt(sum(crossings[k].snr ** 2 for k in group))),
             len(group),
             None,
-            "what was felt around it makes neither line nor spot of it"
+            (ONE_FLANK if any(crossings[i] is each for each in cut) else NEITHER)
             + (
                 f"; the nearest, a {features[nearest[i]].kind}, is {length_text(away[i], 2)} away"
                 if nearest[i] >= 0

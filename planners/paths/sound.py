@@ -181,7 +181,8 @@ def resampled(path: FloatArray, approach: FloatArray, spacing: float) -> tuple[F
     """The polyline (K, 3) and its unit approaches (K, 3) with waypoints put between, at most `spacing` m apart."""
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     count = np.maximum(1, np.ceil(steps / spacing - 1e-9).astype(np.int64))
-    place = np.repeat(np.arange(len(steps)), count) + np.concatenate([np.arange(n) / n for n in count])
+    leg = np.repeat(np.arange(len(steps)), count)
+    place = leg + (np.arange(len(leg)) - (np.cumsum(count) - count)[leg]) / count[leg]
     place = np.append(place, float(len(steps)))
     number = np.arange(len(path))
     path, approach = (np.column_stack([np.interp(place, number, v[:, k]) for k in range(3)]) for v in (path, approach))

@@ -34,7 +34,7 @@ def _picture(records: Sequence[dict[str, Any]]) -> Any:
     names = list(dict.fromkeys(record["shape"] for record in records))
     rows = -(-len(names) // COLUMNS)
     figure = new_figure(2.0 * COLUMNS, 2.3 * rows)
-    panels = figure.subplots(rows, COLUMNS, squeeze=False).flat
+    panels = list(figure.subplots(rows, COLUMNS, squeeze=False).flat)
     for panel in panels:
         panel.set_axis_off()
     for name, panel in zip(names, panels, strict=False):

@@ -1,12 +1,13 @@
 """Round lines: what one sweep felt round the body, as no spot is felt: a line that it ran along.
 
 A spot is felt on the side of the body that it stands on. A sweep that winds round the body and stays off the base for
-longer ran along a line, as along a ring that one turn of a helix passes. No sweep crosses it: how wide it is nothing
-tells, and it is at least as high as it was felt.
+longer ran along a line, as along a ring that one turn of a helix passes. Where no sweep crosses it, nothing tells how
+wide it is, and it is at least as high as it was felt; where others do, they tell the line, and it is no other one.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,12 +16,15 @@ from mapping import Details, Feature, IntArray, Interval, Support
 from mapping.assembly.free.outline import WIDER_THAN_CREST
 from mapping.assembly.linking import Inspection
 from mapping.detection import Crossing, Detections
-from mapping.inference.kinds import kind_made_of
+from mapping.geometry.mesh import nearest_on, resample
+from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 
 # Points of the axis are so far apart round the body, rad: chords lie 0.1^2 / 8, a thousandth of its radius, under it
 AXIS_STEP = 0.1
 # Standard deviations that a place stands clear of its noise by: one of 740 does by chance (one side of a Gaussian)
 CLEAR_SDS = 3.0
+# Points of a line that are asked for other lines
+POINTS_ASKED = 65
 ALONE = (
     "one sweep ran along it round the body, and none crosses it: nothing tells how far beside that sweep it lies, and "
     "how wide it is"
@@ -58,6 +62,31 @@ def round_lines(
             if on and (abs(c.height) < 0.5 * abs(height) or (c.height * height > 0.0 and c.half_width > crest))
         }
     return found, tuple(c for c in detections.crossings if id(c) not in parts)
+
+
+def uncrossed(round_it: Sequence[Feature], features: Sequence[Feature], tip_radius: float) -> list[Feature]:
+    """Those of the lines that single sweeps ran along that are none of the lines which crossings tell.
+
+    A sweep that runs along a line feels it while it is within what that disturbs: where most of what it felt lies as
+    near to lines of its sign, it felt these.
+
+    Args:
+        round_it: of `round_lines`.
+        features: that crossings tell.
+        tip_radius: m.
+    """
+    return [line for line in round_it if not _is_told(line, features, tip_radius)]
+
+
+def _is_told(line: Feature, features: Sequence[Feature], tip_radius: float) -> bool:
+    """True if most of a line lies on others of its sign that crossings tell."""
+    points = resample(line.axis, POINTS_ASKED)
+    on = np.zeros(len(points), dtype=bool)
+    for other in features:
+        if kind_of(other).line and kind_of(other).sign == kind_of(line).sign:
+            away = np.linalg.norm(points - nearest_on(points, other.axis)[0], axis=1)
+            on |= away < sizes_of(other, tip_radius).half_width
+    return bool(on.mean() > 0.5)
 
 
 def _run(crossing: Crossing, inspection: Inspection) -> IntArray:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.detection.filters.cap_kernels import caps as caps
+    from mapping.detection.filters.cap_kernels import cap_products as cap_products, caps as caps
     from mapping.detection.filters.false_alarms import (
         false_alarms_over as false_alarms_over,
         threshold_for as threshold_for,
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     )
 
 _PUBLIC = {
-    "cap_kernels": ("caps",),
+    "cap_kernels": ("cap_products", "caps"),
     "false_alarms": ("false_alarms_over", "threshold_for"),
     "filter_kernels": ("dominant",),
     "matched_filter": (

@@ -27,7 +27,12 @@ def filtered(bins, weights, edge, out):  # type: ignore[no-untyped-def]
         _sum_at(i, edge[count - 1 - i, ::-1], reach, bins, out)
     middle = out[short : max(short, count - short)]
     middle[:] = 0.0
-    for k in range(len(weights)):
+    last = len(weights) // 4 * 4
+    for k in range(0, last, 4):  # four at once: each sum is read and written a quarter as often
+        a, b, c, d, part = weights[k], weights[k + 1], weights[k + 2], weights[k + 3], bins[short - reach + k :]
+        for i in range(len(middle)):
+            middle[i] = middle[i] + a * part[i] + b * part[i + 1] + c * part[i + 2] + d * part[i + 3]
+    for k in range(last, len(weights)):
         weight, part = weights[k], bins[short - reach + k :]
         for i in range(len(middle)):
             middle[i] += weight * part[i]
@@ -35,9 +40,10 @@ def filtered(bins, weights, edge, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _sum_at(i, weights, reach, bins, out):  # type: ignore[no-untyped-def]
-    out[i] = 0.0
+    total = 0.0
     for k in range(max(0, reach - i), min(len(weights), reach + len(bins) - i)):
-        out[i] += weights[k] * bins[i - reach + k]
+        total += weights[k] * bins[i - reach + k]
+    out[i] = total
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -531,6 +531,5 @@ def _window(profile: _Profile, which: int, left: FloatArray, noise: Noise) -> _W
 
 def _whitening(heights: SweepHeights, count: int, merge: int, noise: Noise) -> FloatArray:
     """(count, count) inverse root of the covariance of so many blocks of a profile's bins."""
-    covariances = noise.block_covariances(count, merge * heights.spacing, heights.samples * merge)
-    lags = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariances[lags] + 1e-12 * covariances[0] * np.eye(count))))
+    filter_ = noise.block_filter(count, merge * heights.spacing, heights.samples * merge)
+    return np.ascontiguousarray(filter_.whiten(np.eye(count)).T)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapping import FloatArray, IntArray, MappingError, Surface, dots, read_only, sides_of_box
+from mapping import BoolArray, FloatArray, IntArray, MappingError, Surface, dots, read_only, sides_of_box
 from mapping.geometry.mesh.tree import TriangleTree
 
 # More queries at once than this only cost memory: some 500 bytes each on the way
@@ -55,11 +55,7 @@ class NearestPoint:
         Raises:
             MappingError: points of the wrong shape or not finite.
         """
-        query = np.asarray(points, dtype=np.float64)
-        if query.ndim != 2 or query.shape[1] != 3 or not np.isfinite(query).all():
-            raise MappingError(
-                f"nearest-point queries must be finite points of shape (N, 3); found shape {query.shape}"
-            )
+        query = _finite(points)
         if len(query) == 0:
             empty = np.zeros((0, 3))
             return Nearest(empty, np.zeros(0), np.zeros(0), empty, np.zeros(0, dtype=np.int64), empty)
@@ -68,6 +64,21 @@ class NearestPoint:
         if len(parts) == 1:
             return parts[0]
         return Nearest(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Nearest)))
+
+    def nearer_than(self, points: ArrayLike, reach: float) -> BoolArray:
+        """(N,) True where the mesh is nearer than `reach`, m, to points (N, 3), m: of what is far off nothing is asked.
+
+        Raises:
+            MappingError: points of the wrong shape or not finite.
+        """
+        from mapping.geometry.mesh.nearest_kernels import nearer_than
+
+        query, tree = _finite(points), self._tree[1]
+        near = np.zeros(len(query), dtype=np.bool_)
+        if reach > 0.0:
+            length = float(tree.scale_in(reach))
+            nearer_than(tree.rows, tree.leaves, tree.boxes, tree.links, tree.into(query), length, near)
+        return near
 
     def _answered(self, query: FloatArray) -> Nearest:
         from mapping.geometry.mesh import nearest_kernels as kernels
@@ -208,6 +219,9 @@ class MovedNearestPoint(NearestPoint):
         points, normals = near.points @ self.rotation.T + self.translation, near.normals @ self.rotation.T
         return Nearest(points, near.distance, near.side, normals, near.face, near.barycentric)
 
+    def nearer_than(self, points: ArrayLike, reach: float) -> BoolArray:
+        return self.still.nearer_than((_finite(points) - self.translation) @ self.rotation, reach)
+
     @cached_property
     def edge_normals(self) -> FloatArray:
         return np.asarray(self.still.edge_normals @ self.rotation.T)
@@ -215,6 +229,13 @@ class MovedNearestPoint(NearestPoint):
     def smooth_body(self, face: IntArray, barycentric: FloatArray) -> tuple[FloatArray, FloatArray]:
         normals, over = self.still.smooth_body(face, barycentric)
         return np.asarray(normals @ self.rotation.T), over
+
+
+def _finite(points: ArrayLike) -> FloatArray:
+    query = np.asarray(points, dtype=np.float64)
+    if query.ndim != 2 or query.shape[1] != 3 or not np.isfinite(query).all():
+        raise MappingError(f"nearest-point queries must be finite points of shape (N, 3); found shape {query.shape}")
+    return query
 
 
 def side_bulges(corners: FloatArray, normals: FloatArray) -> FloatArray:

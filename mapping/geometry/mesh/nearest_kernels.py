@@ -50,6 +50,30 @@ def nearest_points(  # type: ignore[no-untyped-def]
         part[q] = part_of(weights)
 
 
+@njit(cache=True, error_model="numpy", nogil=True)
+def nearer_than(rows, leaves, boxes, links, queries, reach, near):  # type: ignore[no-untyped-def]
+    """Write to (N,) whether a triangle is nearer than `reach` to each query (N, 3), in the tree's frame: the first that
+    is found ends the search."""
+    stack = np.empty(STACK, np.int32)
+    found = lanes(2)
+    apart, late = found[0], found[1]
+    still = (0.0, 0.0, 0.0)
+    for q in range(len(queries)):
+        o = vector(queries, q)
+        within = reach + BOX_ROUNDING * sqrt(dot(o, o))
+        near[q] = False
+        stack[0] = len(links) - 1
+        waiting = 1
+        while waiting > 0 and not near[q]:
+            i = -1 - stack[waiting - 1]
+            if i < 0:
+                waiting = push_lanes(leaves, boxes, links, stack, waiting, o, o, still, 0.0, within, apart, late)
+                continue
+            waiting -= 1
+            p = closest(rows, i, o)
+            near[q] = dot(p, p) < reach * reach
+
+
 @borrowing
 def shares_of(rows, i, p):  # type: ignore[no-untyped-def]
     """Barycentric coordinates in a triangle of its point p, none below zero; all at its first corner if it is flat."""

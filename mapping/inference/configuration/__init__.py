@@ -5,7 +5,12 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.inference.configuration.account import UNEXPLAINED as UNEXPLAINED, accounted as accounted
+    from mapping.inference.configuration.account import (
+        UNEXPLAINED as UNEXPLAINED,
+        accounted as accounted,
+        explains as explains,
+    )
+    from mapping.inference.configuration.configuration import Configuration as Configuration
     from mapping.inference.configuration.neighbourhood import (
         NEIGHBOURHOOD_REACH as NEIGHBOURHOOD_REACH,
         Places as Places,
@@ -16,13 +21,14 @@ if TYPE_CHECKING:
         numbers_in as numbers_in,
         share_as_told as share_as_told,
     )
-    from mapping.inference.configuration.wide_lines import is_two as is_two
+    from mapping.inference.configuration.wide_lines import as_round as as_round, is_two as is_two
 
 _PUBLIC = {
-    "account": ("UNEXPLAINED", "accounted"),
+    "account": ("UNEXPLAINED", "accounted", "explains"),
+    "configuration": ("Configuration",),
     "neighbourhood": ("NEIGHBOURHOOD_REACH", "Places"),
     "proposals": ("PROPOSALS", "Proposal"),
     "told": ("in_words", "numbers_in", "share_as_told"),
-    "wide_lines": ("is_two",),
+    "wide_lines": ("as_round", "is_two"),
 }
 doorway(__name__, _PUBLIC)

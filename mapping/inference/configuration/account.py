@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mapping import Feature, MappingError, Posterior, Support
+from mapping import Feature, FloatArray, MappingError, Posterior, Support
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference import describe
@@ -24,6 +24,7 @@ from mapping.inference.configuration.neighbourhood import (
 )
 from mapping.inference.configuration.proposals import (
     PROPOSALS,
+    REMOVE,
     Proposal,
     apart_of,
     as_far_as_felt,
@@ -109,7 +110,14 @@ def accounted(
             block.explained = all(known[k].explained for k in block.origins)
         # what was left behind by something that is weighed elsewhere now is another number than was told with it
         met = {k for block in blocks if len(block.origins) > 1 for k in block.origins}
-        weighed = [block for block in blocks if not again or met & block.origins]
+        weighed = []
+        for block in blocks:
+            same = _known_as(block, known, origin) if again else None
+            if same is not None:
+                block.felt, block.explained = same.felt, same.explained
+                block.features = [_noted(feature, (IN_BLOCKS,)) for feature in block.features]
+            elif not again or met & block.origins:
+                weighed.append(block)
         known_in_all = len(rest) + len(bars) + sum(len(block.features) for block in blocks)
         for _ in range(LAID_ROUNDS):
             for block in weighed:
@@ -130,10 +138,10 @@ def accounted(
             if block.laid is None:
                 continue
             improved, best = _improved(block, *block.laid, around, proposals)
-            left = [spot for spot in left if not _explains(best, spot)]
+            left = [spot for spot in left if not explains(best, spot.axis[0], spot.height.median)]
             noted = again and block.cut
             block.features = [_noted(feature, (IN_BLOCKS,)) for feature in improved] if noted else improved
-            block.explained = best.fits
+            block.explained, block.changed = best.fits, best is not block.laid[1]
             block.felt = _described(best, around) if len(blocks) > 1 else improved
         known = blocks
     return [*rest, *(feature for block in known for feature in block.features)], left
@@ -149,6 +157,7 @@ class _Block:
         cut: True if it is not the whole of its neighbourhood.
         explained: True if what it holds leaves no more than noise, as far as that was asked.
         understood: False if so many places tell of it that one fit would take what is there for all of them.
+        changed: True if a proposal improved it.
         felt: its features where they are likeliest by now, as they are held beside others.
         beside: what was held beside it when it was laid out; None: it was not yet.
         laid: its parts as the rules left them, and the same where they are likeliest; None if too few places tell of
@@ -161,9 +170,20 @@ class _Block:
     cut: bool = False
     explained: bool = True
     understood: bool = True
+    changed: bool = False
     felt: list[Feature] = field(default_factory=list)
     beside: list[Feature] | None = None
     laid: tuple[list[Part], Configuration] | None = None
+
+
+def _known_as(block: _Block, known: Sequence[_Block], origin: dict[int, int]) -> _Block | None:
+    """The block of the look before that has the same features; None if there is none, or anything about it changed."""
+    before = {origin[id(feature)] for feature in block.features}
+    if not block.cut or len(before) != 1:
+        return None
+    (k,) = before
+    whole = len(known[k].features) == len(block.features)
+    return known[k] if whole and not any(known[m].changed for m in block.origins - before) else None
 
 
 def _beside(
@@ -246,6 +266,10 @@ def _improved(
     """The features of one block, as they are or better, and the configuration of the highest odds."""
     group = block.features
     if _is_plain(start):
+        # it was detected over the bare base: beside others that explain what was felt there it may be nothing
+        alone = searched(start, parts, np.zeros((0, 3)), [REMOVE]).best if start.place.held else start
+        if not alone.parts:
+            return [], alone
         return [_with_odds(feature, (), ()) for feature in _bent_as_fitted(group, start, around)], start
     points = [c.point for c in block.crossings if c.kind == "convex"]
     points += [
@@ -255,17 +279,17 @@ def _improved(
     odds = _told(found)
     noted = tuple(note for note, is_so in ((ENDED_EARLY, found.bounded), (UNEXPLAINED, not found.best.fits)) if is_so)
     odds = odds if found.best.fits else ()  # among configurations that are all wrong none is probable
-    adds = len(found.best.kinds) > len(found.start.kinds)
+    best = found.best if found.best.fits else _not_of_misfit(found)
     # a section or a course alone is the posterior's to choose, but where it begins decides what it finds
     solves = found.best.fits and not found.start.fits
     later = set(found.accepted) <= CHOSEN_LATER and found.best.kinds == found.start.kinds and not solves
-    if later or (adds and not found.best.fits and not _pays_beside_misfit(found)):
+    if later or best is found.start:
         laid = _bent_as_fitted(group, found.start, around)
         felt = [_felt_by_runs(feature, found.start.runs(k)) for k, feature in enumerate(laid)]
         return [_with_odds(feature, odds, noted) for feature in felt], found.best
     algorithms = group[0].evidence.algorithms if group else ()
-    features = [_with_odds(feature, odds, noted) for feature in _described(found.best, around, algorithms)]
-    return _meeting(features, around.trace.tip_radius), found.best
+    features = [_with_odds(feature, odds, noted) for feature in _described(best, around, algorithms)]
+    return _meeting(features, around.trace.tip_radius), best
 
 
 def _bent_as_fitted(group: Sequence[Feature], start: Configuration, around: Surroundings) -> list[Feature]:
@@ -284,11 +308,18 @@ def _bends(feature: Feature, around: Surroundings) -> bool:
     return bool(distances(feature.axis, feature.axis[[0, -1]]).max() > half)
 
 
-def _pays_beside_misfit(found: Account) -> bool:
+def _not_of_misfit(found: Account) -> Configuration:
+    """The best of a search that leaves more than noise, or the plainest that it came through, where the details that
+    were added to this do not pay beside its misfit."""
+    best, plainest = found.best, found.plainest
+    adds = len(best.kinds) > len(plainest.kinds)
+    return plainest if adds and not _pays_beside_misfit(best, plainest) else best
+
+
+def _pays_beside_misfit(best: Configuration, start: Configuration) -> bool:
     """True if what was added to a configuration that does not fit either way pays for itself as if what is left over
     were noise: of an unknown level, and one number for each half-width of path, over which a shape is wrong as a whole
     (Schwarz, Annals of Statistics 6, 1978)."""
-    best, start = found.best, found.start
     looks = float(2.0 * best.place.window.half.sum()) / best.place.half_width
     left, before = (float(white @ white) for white in (each.white_residual for each in (best, start)))
     more = len(best.found.mean) - len(start.found.mean)
@@ -296,11 +327,9 @@ def _pays_beside_misfit(found: Account) -> bool:
     return 0.5 * looks * float(np.log(before / left)) - 0.5 * more * float(np.log(looks)) + prior > 0.0
 
 
-def _explains(best: Configuration, spot: Feature) -> bool:
-    """True if a configuration leaves nothing over, and most of a spot where that lies."""
-    away = np.linalg.norm(best.place.window.feet - spot.axis[0], axis=1)
-    near = away < best.place.half_width
-    height = spot.height.median
+def explains(best: Configuration, point: FloatArray, height: float) -> bool:
+    """True if a configuration leaves nothing over, and most of a height (m) where that lies, about a point (3,)."""
+    near = np.linalg.norm(best.place.window.feet - point, axis=1) < best.place.half_width
     return bool(near.any() and best.fits and (best.template[near] / height).max() > MOST_OF_A_SPOT)
 
 

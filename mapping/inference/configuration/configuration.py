@@ -136,9 +136,17 @@ class Configuration:
         return bool(np.ptp(self.place.window.height) >= FELT_TOP * highest)
 
     def strength(self, k: int) -> float:
-        """Signal-to-noise ratio of the k-th part alone, over the bare base."""
+        """Signal-to-noise ratio of the k-th part alone, over the bare base.
+
+        A crest's is of its height alone: one of none stands out of a base that bends away from under it, as at an edge.
+        """
         part = self.parts[k]
-        template = JoinedShape([part.shape], len(self.place.window), PARTS_OF_BIN).templates(part.start[None])
+        alone = JoinedShape([part.shape], len(self.place.window), PARTS_OF_BIN)
+        template = alone.templates(part.start[None])
+        if stands_out(part.shape):
+            none = part.start.copy()
+            none[part.shape.names.index("height")] = 0.0
+            template = template - alone.templates(none[None])
         white = self.place.levels[0][0].filter.whiten(template)[0]
         return float(np.sqrt(white @ white))
 

@@ -168,7 +168,9 @@ def chained(now: Configuration) -> Iterator[Parts]:
     """All pieces of one course as one line, open and closed: rows leave a ring in pieces where they run along it.
 
     The whole has the section of the piece that stands out most: another's would have to be found anew, and until it is
-    the whole is less likely than the pieces.
+    the whole is less likely than the pieces. Pieces of a groove are asked as one whose walls run out, too: two upright
+    ones that lie over each other at a slant leave more of its trace than one does. Not as a closed one: of a groove
+    with ends whose course was laid badly that would be likelier than what it was laid as, and leads nowhere.
     """
     kinds = {kind_of(part.feature).made_of for part in now.parts} - {""}
     for made_of in sorted(kinds):
@@ -194,6 +196,8 @@ def chained(now: Configuration) -> Iterator[Parts]:
             except MappingError:  # pieces that are of no course: as smooth as that it turns back, or leaves the base
                 continue
             yield [*rest, line]
+            if type(line.shape) is GrooveShape and not line.feature.closed:
+                yield [*rest, as_smooth([*rest, line], len(rest), now.place)]
 
 
 def may_be_closed(part: Part) -> bool:

@@ -157,7 +157,7 @@ def crests_of(now: Configuration) -> Crests:
     length = np.linalg.norm(across, axis=1)
     # a spot of height h between two rows is felt h - d^2 / 2R on each, which says how far it is from both
     radius = tip + 0.5 * np.maximum(height[i], height[j])
-    share = 0.5 + radius * (height[j] - height[i]) / np.maximum(length, np.finfo(float).tiny) ** 2
+    share = 0.5 + radius * (height[j] - height[i]) / np.maximum(length**2, np.finfo(float).tiny)
     inside = (run[i] != run[j]) & (np.abs(share - 0.5) < 0.5)
     inside &= length < 2.0 * np.sqrt(2.0 * tip * np.maximum(height[i], height[j]))
     between = feet[i] + share[:, None] * across
@@ -212,9 +212,20 @@ def _traces(axes: FloatArray, heights: FloatArray, place: Neighbourhood) -> Floa
     feet, tip = place.window.feet, place.around.trace.tip_radius
     middle = feet.mean(axis=0)
     feet, first, way = feet - middle, axes[:, 0] - middle, axes[:, 1] - axes[:, 0]
-    square = (way**2).sum(axis=1)
-    onward = way @ feet.T - (way * first).sum(axis=1)[:, None]
-    share = np.clip(onward / np.maximum(square, np.finfo(float).tiny)[:, None], 0.0, 1.0)
-    from_first = (feet**2).sum(axis=1) - 2.0 * first @ feet.T + (first**2).sum(axis=1)[:, None]
-    apart = from_first + share * (share * square[:, None] - 2.0 * onward)
-    return np.asarray(heights[:, None] - apart / (2.0 * tip + heights[:, None]))
+    square = (way**2).sum(axis=1)[:, None]
+    # in place: there are thousands of crests, and as many places
+    onward = way @ feet.T
+    onward -= (way * first).sum(axis=1)[:, None]
+    share = onward / np.maximum(square, np.finfo(float).tiny)
+    np.clip(share, 0.0, 1.0, out=share)
+    apart = first @ feet.T
+    apart *= -2.0
+    apart += (feet**2).sum(axis=1)
+    apart += (first**2).sum(axis=1)[:, None]
+    onward *= -2.0
+    onward += share * square
+    onward *= share
+    apart += onward
+    apart /= -(2.0 * tip + heights[:, None])
+    apart += heights[:, None]
+    return np.asarray(apart)

@@ -61,6 +61,7 @@ class Account:
         best: the last configuration that was accepted: none that was visited is better by more than rounding.
         visited: the best of each set of kinds, of so many parts, the most probable first.
         accepted: names of the proposals that led from the beginning to the best.
+        path: what each of them led to.
         bounded: True if the search ended at MOST_FITTED or MOST_WORK, with proposals left.
     """
 
@@ -68,7 +69,13 @@ class Account:
     best: Configuration
     visited: tuple[Configuration, ...]
     accepted: tuple[str, ...]
+    path: tuple[Configuration, ...]
     bounded: bool = False
+
+    @property
+    def plainest(self) -> Configuration:
+        """The one of the fewest details that the search came through, the last of these."""
+        return min((self.start, *self.path)[::-1], key=lambda each: len(each.kinds))
 
     @property
     def shares(self) -> list[tuple[tuple[str, ...], float]]:
@@ -94,7 +101,7 @@ def searched(
     """
     place, best = start.place, start
     search = _Search(points, proposals, _Spent(len(parts)))
-    spent, accepted = search.spent, search.accepted
+    spent = search.spent
     spent.on(parts, place)
     search.note(start)
     if REMOVE in proposals:
@@ -103,7 +110,7 @@ def searched(
         if best is not start:
             parts = [parts[k] for k in kept]
             search.note(best)
-            accepted.append(REMOVE.name)
+            search.accept(REMOVE, best)
     whole, joining, joiners = laid(parts, place), True, [each for each in (ONE_COURSE, JOIN) if each in proposals]
     # pieces of one line hide each other once they are fitted: they are joined as the rules left them, those first that
     # gain most by it: both flanks of a wide line may be one step to some extent, and no longer a line after that. Where
@@ -126,9 +133,9 @@ def searched(
         if joining:
             whole = joined
             search.note(best)
-            accepted.append(joiner.name)
+            search.accept(joiner, best)
     best = search.climbed(best, TOLD_BY)
-    to_told = len(accepted)
+    to_told = len(search.accepted)
     # what is probable where the log bears so many details is no proof of one more: the search goes on from there for
     # what may be stated, and returns if that leads to what is told
     while True:
@@ -139,11 +146,12 @@ def searched(
         told = max(search.visited.values(), key=TOLD_BY)
         if told.log_odds <= best.log_odds + WORTH:
             break
-        best, to_told = search.climbed(told, TOLD_BY), len(accepted)
+        best, to_told = search.climbed(told, TOLD_BY), len(search.accepted)
     order = sorted(search.visited.values(), key=lambda each: -each.log_probability)
     least = min(order[0].log_probability - NEGLIGIBLE_ODDS, best.log_probability)
     likely = [each for each in order if each.log_probability >= least]
-    return Account(start, best, tuple(likely), tuple(accepted[:to_told]), search.bounded)
+    accepted, path = tuple(search.accepted[:to_told]), tuple(search.path[:to_told])
+    return Account(start, best, tuple(likely), accepted, path, search.bounded)
 
 
 @dataclass(eq=False)
@@ -156,6 +164,7 @@ class _Search:
         spent: what it has taken by now.
         visited: the best of each set of kinds, of so many parts.
         accepted: names of the proposals that led to the best.
+        path: what each of them led to.
         bounded: True if it ended with proposals left.
         asked: how often each proposal had its turn, by name.
     """
@@ -165,6 +174,7 @@ class _Search:
     spent: _Spent
     visited: dict[tuple[tuple[str, ...], int], Configuration] = field(default_factory=dict)
     accepted: list[str] = field(default_factory=list)
+    path: list[Configuration] = field(default_factory=list)
     bounded: bool = False
     asked: Counter[str] = field(default_factory=Counter)
 
@@ -173,6 +183,11 @@ class _Search:
         known = self.visited.get((other.kinds, len(other.parts)))
         if known is None or other.log_odds > known.log_odds:
             self.visited[other.kinds, len(other.parts)] = other
+
+    def accept(self, proposal: Proposal, best: Configuration) -> None:
+        """What a proposal led to is the best by now."""
+        self.accepted.append(proposal.name)
+        self.path.append(best)
 
     def climbed(self, best: Configuration, by: Callable[[Configuration], float]) -> Configuration:
         """A configuration improved by proposals until none is better by what is given."""
@@ -188,9 +203,9 @@ class _Search:
             if found is best and partly is not None and not best.fits:  # what that leaves is told anew once more
                 found, _ = self._better(best, proposal, partly, by)
             if found is not best:
-                best, waiting, idle = found, list(first), 0
-                self.accepted.append(proposal.name)
-                if proposal is RETELL:  # from there the search begins anew
+                explains, best, waiting, idle = found.fits and not best.fits, found, list(first), 0
+                self.accept(proposal, best)
+                if proposal is RETELL or explains:  # from there the search begins anew
                     self.spent.fits, self.bounded = 0.0, False
         return best
 
@@ -202,7 +217,7 @@ class _Search:
         found, spent = best, self.spent
         partly: Configuration | None = None
         for proposed in _yielded(proposal, begun, self.points):
-            if self._ends(proposal):
+            if self._ends(proposal, best):
                 self.bounded = True
                 break
             other = fitted(proposed, best.place, best)
@@ -220,12 +235,13 @@ class _Search:
                     break
         return found, partly
 
-    def _ends(self, proposal: Proposal) -> bool:
+    def _ends(self, proposal: Proposal, best: Configuration) -> bool:
         """True if no more of a proposal is tried. What does not pay for itself goes, and what is left over is told
-        anew, however many there are; no proposal stays unasked because others were asked often."""
+        anew, however many there are; no proposal stays unasked because others were asked often, or while something
+        is left to explain."""
         if proposal in (REMOVE, RETELL):
             return self.spent.too_much
-        return self.spent.enough if self.asked[proposal.name] > 1 else self.spent.all_work
+        return self.spent.enough if best.fits and self.asked[proposal.name] > 1 else self.spent.all_work
 
 
 @dataclass(eq=False)

@@ -72,10 +72,13 @@ def _fit(axis: FloatArray, places: FloatArray, degree: int, closed: bool, sd: fl
     """
     weight, gap = np.ones(len(axis)), 2.0 / len(axis)
     for _ in range(REWEIGHTING_ROUNDS if len(axis) > 3 else 1):
-        design = _design(places, degree, closed)
+        # beside the places as well, at once: three times as many take hardly longer
+        design, ahead, behind = np.split(
+            _design(np.concatenate([places, places + 1e-5, places - 1e-5]), degree, closed), 3
+        )
         root = np.sqrt(weight)[:, None]
         coefficients = np.linalg.lstsq(root * design, root * axis, rcond=None)[0]
-        velocity = (_design(places + 1e-5, degree, closed) - _design(places - 1e-5, degree, closed)) @ coefficients
+        velocity = (ahead - behind) @ coefficients
         speed = np.maximum(lengths(velocity) / 2e-5, np.finfo(float).tiny)
         tangent = velocity / (2e-5 * speed[:, None])
         residual = axis - design @ coefficients

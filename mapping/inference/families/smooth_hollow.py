@@ -100,10 +100,16 @@ def smooth_beginnings(upright: GrooveShape | PitShape, beginnings: FloatArray, s
 
     Args:
         upright: the upright family.
-        beginnings: (B, P) of it: the places of the first are kept.
+        beginnings: (B, P) of it: the places of the first are kept, but for the ends of a line, which are round here:
+            the bottom ends half a mouth short of the wall.
         sizes: preliminary ones.
     """
     places = beginnings[0, _places_of(upright)]
+    if "start" in upright.names:
+        first = upright.names.index("start")
+        start, end = beginnings[0, first : first + 2]
+        half = 0.5 * float(np.exp(beginnings[0, upright.names.index("log width")]))
+        places[-2:] = min(start + half, 0.5 * (start + end)), max(end - half, 0.5 * (start + end))
     starts = [
         [*places, np.log(part * sizes.radius), np.log(more * sizes.height), taper]
         for part in (0.25, 0.5, 1.0)

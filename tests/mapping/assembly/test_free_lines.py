@@ -255,3 +255,40 @@ def test_a_ring_hardly_wider_than_it_is_felt_is_a_closed_ridge_under_rows_one_wa
     (told,) = assembled(ring, 0.64e-3 * np.arange(-8, 9))
     assert told.kind == "ridge" and told.closed
     assert told.height.low < 0.2e-3 < told.height.high
+
+
+def over_cone(away: FloatArray, height: float, radius: float, tip: float) -> FloatArray:
+    """Heights of the ball's path over a cone on a plane, at distances from its axis."""
+    slope = height / radius
+    beside = tip * slope / np.hypot(1.0, slope)  # of the tangent contact
+    flank = height - slope * away + tip * (np.hypot(1.0, slope) - 1.0)
+    apex = height - tip + np.sqrt(np.maximum(tip**2 - np.minimum(away, beside) ** 2, 0.0))
+    return np.maximum(np.where(away < beside, apex, flank), 0.0)
+
+
+def test_a_cone_whose_tip_lies_between_two_rows_is_as_high_as_all_rows_say() -> None:
+    """The highest row was 0.109 mm high (0.108 to 0.110) of 0.15, and one at its foot a bump of its own."""
+    rng, tip = np.random.default_rng(3), 1e-3
+    x, y = np.arange(0.0, 20e-3, 1e-4), np.arange(0.0, 6e-3, 0.8e-3)
+    u, v = (grid.ravel() for grid in np.meshgrid(x, y))
+    z = tip + over_cone(np.hypot(u - 9.7e-3, v - 2.8e-3), 0.15e-3, 1.2e-3, tip) + rng.normal(0.0, 1e-6, len(u))
+    raster = Trace(1e-3 * np.arange(len(u)), np.column_stack([u, v, z]), np.repeat(np.arange(len(y)), len(x)), tip)
+    base = fit_base(raster)
+    (found,) = refine_all(assemble(detect(raster, base), raster, base), raster, 0, base=base)
+    assert found.kind == "bump"
+    assert found.height.low < 0.15e-3 < found.height.high
+    assert found.width.median == pytest.approx(2.4e-3, rel=0.02)
+
+
+def test_what_rows_begin_and_end_on_is_no_feature() -> None:
+    """A plate's rim: each row rolls off it at both of its ends, which was told as two grooves, 1.1 and 0.85 mm wide."""
+    rng, tip, rim = np.random.default_rng(4), 1e-3, 0.25e-3
+    x, y = np.arange(-5e-3, 5e-3, 5e-5), np.arange(0.0, 6e-3, 0.8e-3)
+    u, v = (grid.ravel() for grid in np.meshgrid(x, y))
+    off = np.maximum(np.abs(u) - (5e-3 - rim), 0.0)
+    z = np.sqrt(tip**2 - off**2) + rng.normal(0.0, 1e-6, len(u))
+    raster = Trace(1e-3 * np.arange(len(u)), np.column_stack([u, v, z]), np.repeat(np.arange(len(y)), len(x)), tip)
+    base = fit_base(raster)
+    detections = detect(raster, base)
+    assert len(detections.crossings) >= 2 * len(y) - 2
+    assert assemble(detections, raster, base) == ()

@@ -112,3 +112,16 @@ def test_rows_on_levels_that_no_sweep_climbs_may_be_those_of_any_body() -> None:
     assert fitted(lambda u, v: step_height(u - EDGE, 0.3e-3, TIP)).explains
     # lines along waves stand where these are level, each for itself
     assert not fitted(lambda u, v: 2e-3 * np.round(np.sin(v / 5e-3))).explains
+
+
+def test_a_sawtooth_stands_on_as_many_levels_as_it_has_teeth() -> None:
+    """Cells an eighth of the extent apart are nearly a tooth apart, too: the slope between them is none of the plate's,
+    and all of it seemed one level that scatters widely. A body that bends over the teeth stood for it."""
+
+    def teeth(u: FloatArray, v: FloatArray) -> FloatArray:
+        return 0.025 * u - sum(step_height(u - place, 0.1e-3, TIP) for place in np.arange(-25e-3, 30e-3, 8.5e-3))
+
+    cloud = Cloud.of(raster(teeth), 4000)
+    found = terraced_plane(cloud)
+    assert found is not None and len(np.atleast_1d(found.parameters["levels"])) == 8
+    assert np.median(np.abs(found.residual)) < 2.0 * cloud.scale

@@ -11,6 +11,7 @@ from mapping import FloatArray, Surface, Trace
 from mapping.assembly import assemble
 from mapping.base import Base, LaidTrace, fit_base
 from mapping.detection import Detections, detect, terraced
+from mapping.detection.terraces import _runs
 from mapping.geometry.templates import cap_height, groove_height, step_height
 from mapping.inference.joint import refine_all
 
@@ -186,3 +187,10 @@ def test_a_short_terrace_between_two_others_is_a_stair_and_its_edges_are_two_ste
     assert [step.kind for step in steps] == ["step", "step"]
     assert [step.height.median for step in steps] == pytest.approx([0.2e-3, abs(second)], rel=0.03)
     assert all(np.ptp(step.axis[:, 0]) < 0.5e-3 for step in steps)
+
+
+@pytest.mark.parametrize(("levels", "told"), [((0, 1, 2, 3), 4), ((2, 1, 0), 3), ((0, 1, 0, 1), 0), ((0, 1, 2, 1), 0)])
+def test_stairs_that_lead_on_are_levels_however_short(levels: tuple[int, ...], told: int) -> None:
+    """The teeth of a saw are all shorter than a detail may be: a sweep that went on from each was taken as it was."""
+    level = np.repeat(levels, 10)
+    assert len(_runs(level, np.ones(len(level), dtype=bool), 20.0, 4)) == told

@@ -29,6 +29,9 @@ def test_a_crossing_that_no_feature_accounts_for_is_kept_with_its_place_and_the_
     (lone,) = dropped_crossings([crossing(0.0), crossing(8e-3, 30.0)], [bump(1e-4, 50.0)], 10e-3)
     assert lone.snr == 30.0 and lone.point[0] == 8e-3 and lone.log_odds is None
     assert lone.reason.endswith("the nearest, a bump, is 7.9 mm away")
+    half = crossing(8e-3)
+    (lone,) = dropped_crossings([half], [], 10e-3, [half])
+    assert lone.reason.startswith("sweeps begin or end on it")
     assert dropped_crossings([], [], 10e-3) == ()
     assert len(dropped_crossings([crossing(0.0)], [], 10e-3)) == 1
 

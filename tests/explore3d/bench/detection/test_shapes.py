@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from explore3d.bench.detection import bench_shapes, judged, shape_lines, shapes, write_shapes
 from explore3d.bench.scenes import FELT_SHAPES, FIRST_BUILT_WITH, SECTION_TIP, FeltShape, felt_shape
@@ -132,6 +133,9 @@ def test_the_bench_goes_on_where_it_stopped_and_draws_what_was_told(
     assert lines[1].startswith("L,1,100,1,0,0,0,0,0,0,0,100,100,100,0,100,0,1.5")
     assert lines[-1].startswith("all,2,")
     assert [path.name for path in write_shapes(records, tmp_path)] == ["shapes.csv", "shapes.png"]
+    drawn = imread(tmp_path / "shapes.png")[..., :3].min(axis=2) < 0.99
+    half = drawn.shape[1] // 5
+    assert drawn[:, :half].mean() > 0.01 and drawn[:, half : 2 * half].mean() > 0.001  # a letter, and a ball
 
 
 @pytest.mark.slow

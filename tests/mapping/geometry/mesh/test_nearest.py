@@ -55,3 +55,21 @@ def test_an_edge_of_the_body_is_not_smoothed_away() -> None:
     face = np.arange(len(cube.faces))
     normals = NearestPoint(surface).smooth_normals(face, np.tile([0.8, 0.1, 0.1], (len(face), 1)))
     np.testing.assert_allclose(normals, surface.face_normals, atol=1e-12)
+
+
+def test_what_is_nearer_is_told_without_asking_how_near() -> None:
+    from trimesh.creation import icosphere
+
+    ball = icosphere(subdivisions=2, radius=0.02)
+    body = NearestPoint(Surface(ball.vertices, ball.faces))
+    rng = np.random.default_rng(0)
+    points, turn = 0.02 * rng.standard_normal((400, 3)), np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    true = body.query(points).distance
+    for reach in (1e-3, 1e-2):
+        near = body.nearer_than(points, reach)
+        assert 0 < near.sum() < len(points)
+        assert (near == (true < reach)).all()
+    moved = MovedNearestPoint(Surface(ball.vertices @ turn.T + 1.0, ball.faces), body, turn, np.ones(3))
+    assert (moved.nearer_than(points @ turn.T + 1.0, 1e-2) == (true < 1e-2)).all()
+    assert not body.nearer_than(points, 0.0).any()
+    assert body.nearer_than(np.zeros((0, 3)), 1e-2).shape == (0,)

@@ -30,6 +30,9 @@ from mapping.inference.configuration.account import (
     _beside,
     _Block,
     _holding,
+    _improved,
+    _known_as,
+    _laid_out,
     accounted,
 )
 from mapping.inference.configuration.configuration import (
@@ -43,6 +46,7 @@ from mapping.inference.configuration.configuration import (
 )
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood, window_of
 from mapping.inference.configuration.proposals import (
+    PROPOSALS,
     _course_of,
     as_point,
     chained,
@@ -52,7 +56,7 @@ from mapping.inference.configuration.proposals import (
     straight_lines,
 )
 from mapping.inference.configuration.search import searched
-from mapping.inference.families import Crossing, SmoothGrooveShape, Surroundings
+from mapping.inference.families import Crossing, GrooveShape, SmoothGrooveShape, Surroundings
 from mapping.inference.joint import JoinedShape
 from mapping.instrument import Noise
 
@@ -261,6 +265,31 @@ def test_a_bar_that_is_measured_is_held_beside_what_it_reaches_into() -> None:
     assert left[0] > 0.9 * true.height > 0.2 * true.height > left[1]
 
 
+def test_what_was_detected_where_others_explain_what_is_felt_is_nothing() -> None:
+    (wire,) = (_true(true) for true in classified_body("ridge", FIRST_BUILT_WITH).truth)
+    along = (wire.axis[-1] - wire.axis[0]) / np.linalg.norm(wire.axis[-1] - wire.axis[0])
+    aside = wire.axis.mean(axis=0) + 2e-3 * np.cross(along, [0.0, 0.0, 1.0])
+    edge = replace(wire, kind="step", axis=aside + 5e-3 * np.outer([-1.0, 1.0], along), normals=wire.normals[:2])
+    place = _weighed_on("ridge", [edge])
+    told = []
+    for beside in ([], [wire]):
+        block = _Block([edge], [], frozenset())
+        parts, start = _laid_out(block.features, _holding(beside, place))
+        told.append([each.kind for each in _improved(block, parts, start, place.around, PROPOSALS)[0]])
+    assert told[0] and told[1] == []
+
+
+def test_a_part_of_a_crowd_that_nothing_changed_about_is_not_weighed_twice() -> None:
+    lines = [_true(each) for each in classified_body("wires 2 mm apart", FIRST_BUILT_WITH).truth]
+    known = [_Block([line], [], frozenset(), cut=True) for line in lines]
+    origin = {id(line): k for k, line in enumerate(lines)}
+    again = _Block(lines[:1], [], frozenset((0, 1)), cut=True)
+    assert _known_as(again, known, origin) is known[0]
+    assert _known_as(_Block(lines, [], frozenset((0, 1)), cut=True), known, origin) is None
+    known[1].changed = True
+    assert _known_as(again, known, origin) is None
+
+
 def test_pieces_of_a_line_are_joined_with_their_section() -> None:
     body = "burred groove"
     groove = next(_true(true) for true in classified_body(body, FIRST_BUILT_WITH).truth if true.kind == "groove")
@@ -269,6 +298,8 @@ def test_pieces_of_a_line_are_joined_with_their_section() -> None:
         replace(groove, axis=np.stack([groove.axis[0], middle - 1e-3 * np.eye(3)[0]]), normals=up),
         replace(groove, axis=np.stack([middle + 1e-3 * np.eye(3)[0], groove.axis[-1]]), normals=up),
     ]
+    more = replace(groove.evidence, snr=groove.evidence.snr + 1.0)  # the whole has the section of what stands out most
+    pieces[0] = replace(pieces[0], evidence=more)
     place = _weighed_on(body, [groove])
     first = as_smooth([part_of(pieces[0], place)], 0, place)
     now = laid([first, part_of(pieces[1], place)], place)
@@ -277,6 +308,83 @@ def test_pieces_of_a_line_are_joined_with_their_section() -> None:
         assert any(type(whole.shape) is SmoothGrooveShape for whole in wholes)
         smooth = next(whole for whole in wholes if type(whole.shape) is SmoothGrooveShape)
         np.testing.assert_array_equal(smooth.start[-3:], first.start[-3:])
+
+
+def test_pieces_of_a_groove_are_joined_as_one_whose_walls_run_out_too() -> None:
+    """Two upright grooves that lie over each other at a slant leave more of such a trace than one upright one does."""
+    place, pieces = _upright_grooves((-0.3, -5.0, 0.3, 2.0), (0.3, -2.0, -0.3, 5.0))
+    now = laid([part_of(piece, place, 1) for piece in pieces], place)
+    whole = {type(parts[0].shape): parts for parts in chained(now) if parts[0].shape.modes.degree == 1}
+    assert set(whole) == {GrooveShape, SmoothGrooveShape}
+    pair, smooth = fitted(now.parts, place), fitted(whole[SmoothGrooveShape], place)
+    assert pair is not None and smooth is not None and smooth.log_odds > pair.log_odds + 10.0
+
+
+def test_no_lone_groove_is_asked_as_a_closed_one_whose_walls_run_out() -> None:
+    place, (groove,) = _upright_grooves((0.0, -5.0, 0.0, 5.0))
+    turn = np.linspace(0.0, 1.6 * np.pi, 40)
+    course = 3e-3 * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(40)])
+    ring = replace(groove, axis=course, normals=np.tile([0.0, 0.0, 1.0], (40, 1)))
+    wholes = [parts[0] for parts in chained(laid([part_of(ring, place)], place))]
+    assert wholes and all(whole.feature.closed and type(whole.shape) is GrooveShape for whole in wholes)
+
+
+def test_a_groove_whose_walls_run_out_ends_half_a_mouth_short_of_an_upright_one() -> None:
+    place, (groove,) = _upright_grooves((0.0, -5.0, 0.0, 5.0))
+    upright = part_of(groove, place, 1)
+    smooth = as_smooth([upright], 0, place)
+    ends = [part.start[part.shape.names.index("start") :][:2] for part in (upright, smooth)]
+    half = 0.5 * np.exp(upright.start[upright.shape.names.index("log width")])
+    np.testing.assert_allclose(ends[1] - ends[0], [half, -half], rtol=1e-9)
+    place, (short,) = _upright_grooves((0.0, -0.3, 0.0, 0.3))
+    smooth = as_smooth([part_of(short, place, 1)], 0, place)
+    start, end = smooth.start[smooth.shape.names.index("start") :][:2]
+    assert start == end
+
+
+def _upright_grooves(*courses: tuple[float, float, float, float]) -> tuple[Neighbourhood, list[Feature]]:
+    """Grooves along courses (x, y, x, y; mm) of 0.33 x 3 mm over a cosine groove 10.4 mm long, and where they lie."""
+    trace, base = _cosine_groove(10e-6, 2)
+    up = np.tile([0.0, 0.0, 1.0], (len(trace), 1))
+    height, width = Interval(-0.33e-3, -0.35e-3, -0.3e-3), Interval(3e-3, 2e-3, 4e-3)
+    length = Interval(10e-3, 9e-3, 11e-3)
+    grooves = [
+        Feature("groove", 1e-3 * np.array([[x, y, 0.0], [u, v, 0.0]]), up[:2], height, width, length, Support(99.0, 9),
+                True, 2e-5)
+        for x, y, u, v in courses
+    ]  # fmt: skip
+    feet, own = trace.centers - [0.0, 0.0, trace.tip_radius], slice(None, None, 10)
+    samples = np.ones(len(feet[own]), dtype=np.int64)
+    places = Places(feet[own] * [1.0, 1.0, 0.0], up[own], feet[own, 2], samples, trace.sweep[own], 0.2e-3)
+    place = neighbourhood(grooves, [], places, Surroundings(trace, base, Noise(10e-6, 0.0, 1e-3)), 0.01)
+    assert place is not None
+    return place, grooves
+
+
+def test_a_crest_of_no_height_stands_out_of_no_edge() -> None:
+    """A round crest that touches the base where that turns down leaves it there, however low it is."""
+    tip, radius, spacing = 3e-3, 1e-3, 0.1e-3
+    y, x = (each.ravel() for each in np.meshgrid(np.arange(-5e-3, 5e-3, 1e-3), np.arange(-5e-3, 5e-3, spacing)))
+    far = np.abs(x) / np.sqrt(2.0)
+    corners = 0.02 * np.array([[0, -1, 0], [0, 1, 0], [1, 1, -1], [1, -1, -1], [-1, 1, -1], [-1, -1, -1]])
+    base = Base(Surface(corners, [[0, 3, 2], [0, 2, 1], [0, 1, 4], [0, 4, 5]]))
+    normals = np.column_stack([np.sign(x), np.zeros(len(x)), np.ones(len(x))]) / np.sqrt(2.0)
+    feet, sweep = np.column_stack([np.sign(x) * far, y, -far]), np.round(1e3 * y).astype(np.int64)
+    order = np.lexsort((x, sweep))
+    feet, normals, sweep = feet[order], normals[order], sweep[order]
+    trace = Trace(1e-3 * np.arange(len(feet)), feet + tip * normals, sweep, tip)
+    crest = Feature("ridge", 1e-3 * np.array([[0.0, -4, 0], [0.0, 4, 0]]), np.tile([0.0, 0.0, 1.0], (2, 1)),
+                    Interval(50e-6, 40e-6, 60e-6), Interval(50e-6, 20e-6, 1e-3), Interval(8e-3, 7e-3, 9e-3),
+                    Support(9.0, 9), True, 1e-4)  # fmt: skip
+    places = Places(feet, normals, np.zeros(len(feet)), np.ones(len(feet), dtype=np.int64), sweep, spacing)
+    place = neighbourhood([crest], [], places, Surroundings(trace, base, Noise(10e-6, 0.0, 1e-3)), 0.01)
+    assert place is not None
+    part = part_of(crest, place, 1)
+    start = part.start.copy()
+    start[[part.shape.names.index(name) for name in ("height", "log radius")]] = 0.0, np.log(radius)
+    flat = laid([replace(part, start=start)], place)
+    assert flat.template.max() > 0.1e-3  # it reaches out of the edge
+    assert flat.strength(0) == 0.0 and laid([part], place).strength(0) > 5.0
 
 
 def test_pieces_are_one_course_where_they_are_nearest_and_what_runs_beside_it_leads_nowhere() -> None:

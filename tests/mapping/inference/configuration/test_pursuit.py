@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import pytest
 
 from explore3d.bench.posterior.calibration import plate, record, straight_path
 from explore3d.bench.posterior.counts import run_counts
 from explore3d.bench.scenes import FIRST_BUILT_WITH
 from mapping import Details, Feature, FloatArray, Interval, Support
-from mapping.inference.configuration import Places
+from mapping.inference.configuration import Places, pursuit
 from mapping.inference.configuration.configuration import Configuration, as_bell, fitted, laid, part_of
 from mapping.inference.configuration.neighbourhood import neighbourhood
 from mapping.inference.configuration.proposals import apart, axis_of, between, retold
@@ -99,3 +102,15 @@ def test_a_groove_is_asked_between_ridges_of_any_section() -> None:
     asked = laid([as_bell(first, 0.5 * told.place.half_width), second], told.place)
     (hollow,) = [parts for parts in between(asked) if len(parts) == 3]
     assert [part.feature.kind for part in hollow] == ["ridge", "ridge", "groove"]
+
+
+def test_tops_that_two_sweeps_felt_in_one_place_are_spots_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    feet, up = 1e-3 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.eye(3)[2]
+    tangents, runs = np.eye(3)[[0, 0, 1, 1]], np.array([0, 2, 4])
+    window = SimpleNamespace(feet=feet, starts=runs, normals=np.tile(up, (4, 1)), tangents=tangents)
+    around = SimpleNamespace(trace=SimpleNamespace(tip_radius=3e-3))
+    place = SimpleNamespace(window=window, half_width=1e-3, around=around)
+    monkeypatch.setattr(pursuit, "_tops", lambda now: (np.array([0, 2]), np.array([0.10e-3, 0.11e-3])))
+    now: Any = SimpleNamespace(place=place)
+    crests = pursuit.crests_of(now)
+    assert len(crests) and np.isfinite(crests.axes).all() and np.isfinite(crests.heights).all()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from mapping.inference.configuration import search
+from mapping.inference.configuration.account import _not_of_misfit
 from mapping.inference.configuration.configuration import HOPELESS, Configuration
 from mapping.inference.configuration.neighbourhood import Neighbourhood
 from mapping.inference.configuration.proposals import Proposal
@@ -19,11 +20,13 @@ PLACE: Any = SimpleNamespace(levels=[None], window=range(10), held=())
 DETAIL: Any = SimpleNamespace(start=np.zeros(1))
 
 
-def found(parts: list[Any], gain: float, company: float = 0.0) -> Any:
-    """A configuration that each detail makes likelier by so much, and more probable by more."""
+def found(parts: list[Any], gain: float, company: float = 0.0, details: int = 0) -> Any:
+    """A configuration that each detail makes likelier by so much, and more probable by more; of fewer details than
+    there are it does not fit."""
     odds = [each * len(parts) for each in (gain, gain + company)]
     kinds = ("ridge",) * len(parts)
-    return SimpleNamespace(parts=parts, place=PLACE, kinds=kinds, log_odds=odds[0], log_probability=odds[1])
+    fits = len(parts) >= details
+    return SimpleNamespace(parts=parts, place=PLACE, kinds=kinds, log_odds=odds[0], log_probability=odds[1], fits=fits)
 
 
 def more(now: Any, points: Any) -> Iterator[list[Any]]:
@@ -69,12 +72,40 @@ def test_no_proposal_stays_unasked_because_another_was_asked_often(monkeypatch: 
     assert len(account.best.parts) == 1 and account.bounded  # the second detail would be asked for once more
 
 
+def test_the_search_goes_on_while_something_is_left_to_explain(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search, "FIRST", ())
+    often = Proposal("often", lambda now, points: iter([[]] * (search.MOST_FITTED + 1)))
+    for details, told in ((0, 1), (2, 2)):
+        monkeypatch.setattr(
+            search, "fitted", lambda parts, place, rival=None, anew=False, n=details: found(parts, 2.0, 0.0, n)
+        )
+        start = found([], 2.0, 0.0, details)
+        account = search.searched(start, [], np.zeros((0, 3)), [often, Proposal("more", more)])
+        assert len(account.best.parts) == told
+
+
 def test_what_is_probable_beside_others_is_stated_and_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
     account, _ = searched(monkeypatch, -2.0, 4.0)
     assert account.best is account.start and account.accepted == ()
     weights = np.exp([4.0, 2.0, 0.0]) / np.exp([4.0, 2.0, 0.0]).sum()
     assert [len(kinds) for kinds, _ in account.shares] == [2, 1, 0]
     np.testing.assert_allclose([share for _, share in account.shares], weights)
+
+
+def test_details_that_were_added_on_the_way_pay_beside_the_misfit_or_are_not_told() -> None:
+    """One groove that stands for three pieces leaves more than noise, of which a pit explains little or much."""
+    place: Any = SimpleNamespace(window=SimpleNamespace(half=np.full(1000, 0.2e-3)), half_width=1.3e-3)
+
+    def left(kinds: tuple[str, ...], square: float) -> Any:
+        white, prior = np.full(1000, np.sqrt(square)), -8.0 * len(kinds)
+        fitted = SimpleNamespace(mean=np.zeros(4 * len(kinds)))
+        return SimpleNamespace(kinds=kinds, place=place, white_residual=white, log_prior=prior, found=fitted)
+
+    pieces, whole, pit = left(("groove",) * 3, 3.6), left(("groove",), 1.9), ("groove", "pit")
+    for square, told in ((1.8, whole.kinds), (1.2, pit)):
+        best = left(pit, square)
+        account = search.Account(pieces, best, (), ("one course", "add"), (whole, best))
+        assert account.plainest is whole and _not_of_misfit(account).kinds == told
 
 
 def test_details_are_as_probable_as_the_log_shows_others() -> None:

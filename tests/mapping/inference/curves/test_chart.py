@@ -73,3 +73,20 @@ def test_arcs_are_as_long_as_the_smooth_curve_and_chords_are_not() -> None:
     assert chart.length < 0.9965 * 2.0 * np.pi * 0.01
     straight = along(-0.01, 0.01)
     assert straight.arcs == pytest.approx(straight.s - straight.s[0], rel=1e-12)
+
+
+def test_a_bent_line_goes_on_as_it_ends_and_is_felt_as_itself_where_it_would_run_into_itself() -> None:
+    """Two arcs of 250 degrees: a chord of a third of them leaves the line by 84 degrees where it ends, and straight on
+    it runs through its own middle. The ball that rests there rests on the line, not beyond its end."""
+    turned = np.linspace(np.radians(20.0), np.radians(270.0), 200)
+    arc = 3e-3 * np.column_stack([np.cos(turned), 1.0 + np.sin(turned), 0.0 * turned])
+    axis = np.vstack([arc, -arc[-2::-1]])
+    chart = chart_along(axis, np.tile(UP, (len(axis), 1)), plate(), TIP, 0.25e-3, 0.01, 3.6e-3)
+    onward = np.array([np.sin(turned[0]), -np.cos(turned[0]), 0.0])
+    assert chart.tangents[3] @ -onward > np.cos(np.radians(10.0))
+    s, lateral, _ = chart.coordinates(axis)
+    felt = np.linalg.norm(np.diff(axis, axis=0), axis=1).sum()
+    assert s[-1] - s[0] == pytest.approx(felt, rel=1e-3) and (np.diff(s) >= 0.0).all()
+    assert np.abs(lateral).max() < 0.02e-3
+    beyond = axis[0] + 2e-3 * onward
+    assert chart.coordinates(beyond[None])[0][0] < s[0]
