@@ -27,6 +27,7 @@ def test_an_account_that_counts_what_was_dropped_is_not_told() -> None:
         features=features,
         detections=SimpleNamespace(crossings=()),
         trace=SimpleNamespace(tip_radius=1e-3),
+        inspections=None,
         backlash=None,
         yielding=None,
         stages=SimpleNamespace(left_out=[]),
