@@ -222,7 +222,7 @@ class _Search:
                 break
             other = fitted(proposed, best.place, best)
             spent.on(proposed, best.place, GIVEN_UP_SHARE if other is None else 1.0)
-            if other is None:
+            if other is None or _is_nothing_by_misfit(other):
                 continue
             # crests beside crests hide what has another form: what is told anew leaves nothing, or is none
             if proposal is RETELL and not other.fits:
@@ -300,13 +300,18 @@ def _without_idle(start: Configuration, spent: _Spent) -> tuple[Configuration, l
             rest = [*best.parts[:k], *best.parts[k + 1 :]]
             trials.append(fitted(rest, best.place, best))
             spent.work += (GIVEN_UP_SHARE if trials[-1] is None else 1.0) * _work(rest, best.place)
-        odds = [-np.inf if trial is None else trial.log_odds for trial in trials]
+        odds = [-np.inf if trial is None or _is_nothing_by_misfit(trial) else trial.log_odds for trial in trials]
         idlest = int(np.argmax(odds)) if odds else 0
         other = trials[idlest] if odds else None
         if other is None or odds[idlest] <= best.log_odds + WORTH:
             return best, kept, False
         best, kept = other, [*kept[:idlest], *kept[idlest + 1 :]]
     return best, kept, True
+
+
+def _is_nothing_by_misfit(other: Configuration) -> bool:
+    """True of nothing where more than noise was felt: misfit is of a shape, and nothing has none that may be wrong."""
+    return not other.parts and not other.place.held and not other.fits
 
 
 def _yielded(proposal: Proposal, now: Configuration, points: FloatArray) -> Iterator[Parts]:

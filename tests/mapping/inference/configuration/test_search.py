@@ -84,6 +84,17 @@ def test_the_search_goes_on_while_something_is_left_to_explain(monkeypatch: pyte
         assert len(account.best.parts) == told
 
 
+def test_what_was_felt_is_not_taken_for_nothing_because_its_shape_misfits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search, "FIRST", (search.REMOVE,))
+    for details, left in ((0, 0), (2, 1)):  # nothing leaves no more than noise, or does
+        monkeypatch.setattr(
+            search, "fitted", lambda parts, place, rival=None, anew=False, n=details: found(parts, -2.0, 0.0, n)
+        )
+        start = found([DETAIL], -2.0, 0.0, details)
+        account = search.searched(start, [DETAIL], np.zeros((0, 3)), [search.REMOVE])
+        assert len(account.best.parts) == left
+
+
 def test_what_is_probable_beside_others_is_stated_and_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
     account, _ = searched(monkeypatch, -2.0, 4.0)
     assert account.best is account.start and account.accepted == ()
