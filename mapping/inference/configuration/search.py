@@ -114,8 +114,9 @@ def searched(
     whole, joining, joiners = laid(parts, place), True, [each for each in (ONE_COURSE, JOIN) if each in proposals]
     # pieces of one line hide each other once they are fitted: they are joined as the rules left them, those first that
     # gain most by it: both flanks of a wide line may be one step to some extent, and no longer a line after that. Where
-    # all pieces are one course that leaves no more than noise no pairs of them are tried
-    while joining and not spent.enough:
+    # all pieces are one course that leaves no more than noise no pairs of them are tried. Nothing hides a single piece:
+    # whether it returns is asked when its section was
+    while joining and len(whole.parts) > 1 and not spent.enough:
         joining = False
         for proposal in joiners:
             if joining and len(best.parts) == 1 and best.fits:

@@ -95,6 +95,22 @@ def test_what_was_felt_is_not_taken_for_nothing_because_its_shape_misfits(monkey
         assert len(account.best.parts) == left
 
 
+def test_a_single_piece_is_asked_whether_it_returns_when_its_section_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    for pieces, first in ((1, "section"), (2, "one course")):
+        asked: list[str] = []
+
+        def noted(name: str, asked: list[str] = asked) -> Proposal:
+            return Proposal(name, lambda now, points: iter(asked.append(name) or ()))  # type: ignore[func-returns-value]
+
+        section, course = noted("section"), noted("one course")
+        monkeypatch.setattr(search, "FIRST", (section,))
+        monkeypatch.setattr(search, "ONE_COURSE", course)
+        monkeypatch.setattr(search, "laid", lambda parts, place: found(parts, 2.0))
+        parts = [DETAIL] * pieces
+        search.searched(found(parts, 2.0), parts, np.zeros((0, 3)), [section, course])
+        assert asked[0] == first and len(asked) > 1
+
+
 def test_what_is_probable_beside_others_is_stated_and_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
     account, _ = searched(monkeypatch, -2.0, 4.0)
     assert account.best is account.start and account.accepted == ()
