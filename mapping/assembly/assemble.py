@@ -146,6 +146,7 @@ def assemble(
 
 
 def _left_by(best: Configuration, crossing: Crossing) -> bool:
+    """True if a configuration explains what a sweep detected."""
     return explains(best, crossing.point, crossing.height)
 
 

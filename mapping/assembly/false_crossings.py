@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapping import Feature, lengths
+from mapping.assembly.free import CLEAR_SDS
 from mapping.assembly.linking import Inspection, groups, uphill
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
@@ -67,7 +68,8 @@ def is_plateau_end(crossing: Crossing, inspection: Inspection) -> bool:
 
 # Share of the crest at which a sweep that ends so high is still up.
 STILL_UP = 0.25
-# Places of a sweep whose heights are looked at, to a half-width of a sharp crest of the typical height
+# Places of a sweep whose heights are looked at, to a half-width w of a sharp crest of the typical height: its top lies
+# w / 10 from one of them at most, where a parabola is lower by (1 / 10)^2, a hundredth
 PLACES_OF_HALF = 5.0
 # A crest is that of what was felt if it is half as high there, at least: half-way between it and nothing.
 OUTERMOST = 0.5
@@ -119,7 +121,7 @@ def is_cut(crossing: Crossing, inspection: Inspection) -> bool:
     heights, sd = np.sign(crossing.height) * inspection.height[own], inspection.sd[own]
     for side in (slice(0, nearest + 1), slice(len(own) - 1, nearest - 1 if nearest else None, -1)):
         way, far = heights[side], gap[side]
-        doubt = 3.0 * float(np.hypot(sd[side][0], sd[side][way.argmax()]))
+        doubt = CLEAR_SDS * float(np.hypot(sd[side][0], sd[side][way.argmax()]))
         if far[0] < crossing.half_width and way[0] > OUTERMOST * abs(crossing.height) and way.max() - way[0] < doubt:
             return True
     return False

@@ -14,7 +14,11 @@ if TYPE_CHECKING:
     from mapping.assembly.free.mean_section import mean_sizes as mean_sizes
     from mapping.assembly.free.outline import WIDER_THAN_CREST as WIDER_THAN_CREST
     from mapping.assembly.free.rival_courses import outweighed as outweighed
-    from mapping.assembly.free.round_lines import round_lines as round_lines, uncrossed as uncrossed
+    from mapping.assembly.free.round_lines import (
+        CLEAR_SDS as CLEAR_SDS,
+        round_lines as round_lines,
+        uncrossed as uncrossed,
+    )
     from mapping.assembly.free.section import CORE as CORE
 
 _PUBLIC = {
@@ -23,7 +27,7 @@ _PUBLIC = {
     "mean_section": ("mean_sizes",),
     "outline": ("WIDER_THAN_CREST",),
     "rival_courses": ("outweighed",),
-    "round_lines": ("round_lines", "uncrossed"),
+    "round_lines": ("CLEAR_SDS", "round_lines", "uncrossed"),
     "section": ("CORE",),
 }
 doorway(__name__, _PUBLIC)

@@ -23,7 +23,7 @@ from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 AXIS_STEP = 0.1
 # Standard deviations that a place stands clear of its noise by: one of 740 does by chance (one side of a Gaussian)
 CLEAR_SDS = 3.0
-# Points of a line that are asked for other lines
+# Points of a line that are asked for other lines: whether most of it lies on these is told to a 64th of its length
 POINTS_ASKED = 65
 ALONE = (
     "one sweep ran along it round the body, and none crosses it: nothing tells how far beside that sweep it lies, and "

@@ -16,8 +16,9 @@ from mapping.inference.curves.body_edge import Wall, up_to_edges
 
 # Legs longer than this, in tip radii, are asked in between where a wall begins: a ball feels one from a radius away on
 ASKED_WALL = 0.5
-# Chords that tell in which direction a line ends, in half-widths of its disturbance: with a half and a quarter an S of
-# arcs of 3 mm under a ball of 10 mm is told as likely, by 3 of log evidence
+# Chords that tell in which direction a line ends, in half-widths of its disturbance: an S of arcs of 3 mm under a ball
+# of 10 mm (building seed 1000) has the log evidence 7098.7 with a half, 7101.4 with a quarter, whose chords hold more
+# noise; two ridges and a bump had 7033.1 before
 ONWARD = 0.5
 
 
